@@ -4,14 +4,16 @@ All solve the stabilised DAE form with the same start and tolerances, and IDA is
 the integration, and a run from making IDA's memory to freeing it.  Atwood and the C by hand then take the same steps
 but for rounding.  The C by hand has a band solver for chains, and Atwood eliminates with fixed pivots.  Python
 callbacks are Atwood's driver with the same problem without its compiled functions: plain Python called through ctypes.
-The row of scikit-sundae is the reference driver, with its own options.
+The row of scikit-sundae is that package's own driver, with its own options.
 """
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import by_hand
@@ -20,8 +22,12 @@ from by_hand_runs import IdaRun, tuned
 from mechanisms import Mechanism, chain, double_pendulum, pendulum
 from timing import best_of, options, print_table, ratio, save
 
-from atwood.integrators.ida import library as sundials_library, sundae as ida_sundae
+from atwood.integrators.ida import library as sundials_library
 from atwood.integrators.protocol import Status
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from tests.helpers import scikit_sundae
 
 GOAL, GOAL_PYTHON = 1.2, 8.0
 """Atwood / C at most, and Python callbacks / Atwood at least."""
@@ -59,7 +65,7 @@ def sundae_measure(prepared: Prepared, rtol: float) -> Measure:
 
     def run() -> tuple[float, float, int]:
         began = time.perf_counter()
-        session = ida_sundae.open_session(problem, settings, 0.0, prepared.y, prepared.yp)
+        session = scikit_sundae.open_session(problem, settings, 0.0, prepared.y, prepared.yp)
         status = session.advance(t_end).status
         spent = time.perf_counter() - began
         if status is not Status.REACHED:

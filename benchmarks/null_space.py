@@ -7,19 +7,25 @@ the rows are computed and when the choice is reviewed.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from timing import best_of, options, print_table, ratio, save
 
 from atwood import Scene, simulate
-from atwood.integrators.ida import library as sundials_library, native as ida_native, sundae as ida_sundae
+from atwood.integrators.ida import library as sundials_library, native as ida_native
 from atwood.integrators.protocol import Budget, SolverOptions, Statistics, Status
 from atwood.simulation.problem.preparation import make_problem, pack_state
 from atwood.simulation.problem.problem import SceneProblem
 from atwood_library import Ground, Link, Pivot
 from atwood_library.scenes import FourBar, SliderCrank
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from tests.helpers import scikit_sundae
 
 
 def row_of_four_bars(windows: int) -> Scene:
@@ -81,7 +87,7 @@ def runs_of(scene: Scene, t_end: float, rtol: float) -> dict[str, Callable[[], t
 
     def sundae() -> tuple[Statistics, SceneProblem]:
         plan, settings, y, yp = prepared()
-        session = ida_sundae.open_session(plan.problem(), settings, 0.0, y, yp, Budget(poll=plan.between_steps))
+        session = scikit_sundae.open_session(plan.problem(), settings, 0.0, y, yp, Budget(poll=plan.between_steps))
         return (session.advance(t_end) and session.statistics), plan
 
     return {"compiled": lambda: native(True), "Python": lambda: native(False), "sundae": sundae}

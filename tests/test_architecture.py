@@ -63,7 +63,7 @@ def test_the_library_may_use_the_facades_and_no_other_room() -> None:
 
 
 def test_the_solver_library_is_loaded_only_when_a_run_starts() -> None:
-    done = run_python("-c", "import sys, atwood.integrators.ida.sundae; print('sksundae' in sys.modules)")
+    done = run_python("-c", "import sys, atwood.integrators.ida.native; print('sksundae' in sys.modules)")
     assert done.stdout.strip() == "False", done.stderr
 
 

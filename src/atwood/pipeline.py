@@ -273,8 +273,8 @@ def simulate(
         shorter one helps where forces set in far faster than they act at the start.
     solver
         Method: IDA, a Runge-Kutta method, Taylor series, or a symplectic one; ``"auto"`` chooses one that suits. It is
-        ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method through
-        scikit-sundae with the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
+        ``"ida"``: SUNDIALS IDA with the equations as machine code. ``"ida-sundae"``: the same method with IDA's own
+        options and the equations as Python, the reference. ``"explicit"``: a Runge-Kutta method of order 8(5,3),
         on constraints too. ``"tsitouras"``: one of order 5(4), which takes fewer slopes where few digits are asked for.
         ``"taylor"``: Taylor series, on constraints too, where every law has them. ``"auto"``: IDA for what is
         stiff, or turns out so, and for index 1; else an explicit method. `Result.solver` says which, and why.

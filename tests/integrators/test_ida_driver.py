@@ -1,4 +1,4 @@
-"""Both drivers of IDA: right answers, exact times, and no way to lose a state."""
+"""The driver of IDA, and scikit-sundae: right answers, exact times, and no way to lose a state."""
 
 import math
 import os
@@ -16,7 +16,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from atwood.errors import KernelEvaluationError, StartError, UsageError
-from atwood.integrators.ida import library as sundials_library, native as ida_native, sundae as ida_sundae
+from atwood.integrators.ida import library as sundials_library, native as ida_native
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,
@@ -26,10 +26,12 @@ from atwood.integrators.protocol import (
     choose_linear_solver,
 )
 
+from ..helpers import scikit_sundae
+
 TIGHT = SolverOptions(relative_tolerance=1e-9, absolute_tolerances=1e-11)
 LOOSE = SolverOptions(relative_tolerance=1e-5, absolute_tolerances=1e-7)
 
-DRIVERS: dict[str, Any] = {"scikit-sundae": ida_sundae.open_session, "native": ida_native.open_session}
+DRIVERS: dict[str, Any] = {"scikit-sundae": scikit_sundae.open_session, "native": ida_native.open_session}
 open_session = DRIVERS["scikit-sundae"]
 
 
@@ -373,7 +375,8 @@ class TestLimits:
     def test_ctrl_c_ends_a_run_in_another_process(self, driver: str) -> None:
         here = Path(__file__).resolve()
         script = (
-            "import os, signal, sys, threading; sys.path.insert(0, sys.argv[1]); import test_ida_driver as tests\n"
+            "import os, signal, sys, threading; sys.path.insert(0, sys.argv[1])\n"
+            "import tests.integrators.test_ida_driver as tests\n"
             "signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it\n"
             "tests.open_session = tests.DRIVERS[sys.argv[2]]\n"
             "session = tests.start(tests.oscillator(), tests.LOOSE, [1, 0], [0, -1])\n"
@@ -384,7 +387,7 @@ class TestLimits:
         )
         path = os.pathsep.join(str(here.parents[2] / part) for part in ("src", "library"))
         done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", script, str(here.parent), driver],
+            [sys.executable, "-W", "error", "-c", script, str(here.parents[2]), driver],
             env={**os.environ, "PYTHONPATH": path},
             capture_output=True,
             text=True,

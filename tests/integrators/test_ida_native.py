@@ -18,13 +18,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from atwood.errors import UsageError
-from atwood.integrators.ida import library as sundials_library, memory, native as ida_native, sundae as ida_sundae
+from atwood.integrators.ida import library as sundials_library, memory, native as ida_native
 from atwood.integrators.ida.callbacks import Record, address, jacobian_function, residual_function, weight_function
 from atwood.integrators.ida.native import NativeSession
 from atwood.integrators.ida.setup import IdaTuning
 from atwood.integrators.protocol import Budget, ImplicitProblem, NativeCallbacks, SolverOptions, Status
 from atwood_library.scenes import DoublePendulum
 
+from ..helpers import scikit_sundae
 from ..helpers.runs import packed, prepare
 
 pytestmark = pytest.mark.skipif(not sundials_library.available(), reason=sundials_library.why_not() or "available")
@@ -226,6 +227,16 @@ class TestLibrary:
         files = sundials_library._library_files(tmp_path / "sksundae")
         assert (files["sundials_core"].name, files["sundials_ida"].name) == names
 
+    def test_libraries_elsewhere_are_found_by_what_was_linked_with_them(self, monkeypatch: Any) -> None:
+        monkeypatch.setattr(sundials_library, "_ENDINGS", "no such ending")
+        monkeypatch.setattr(sundials_library, "_found", None)
+        assert sundials_library.library().folder == sundials_library._package_folder()
+        problem, y, yp = chain(80)
+        for solver in ("dense", "sparse"):
+            options = SolverOptions(1e-6, 1e-8, linear_solver=solver)
+            found = ida_native.open_session(problem, options, 0.0, y, yp).advance(0.2)
+            assert_allclose(found.y, scikit_sundae.open_session(problem, options, 0.0, y, yp).advance(0.2).y, atol=1e-4)
+
 
 class TestAgreement:
     """Bit for bit, where the options agree."""
@@ -235,7 +246,7 @@ class TestAgreement:
         options = SolverOptions(1e-7, np.array([1e-7] * 4 + [1e3] * 2))
         problem = with_c_functions(pendulum(), Record()) if compiled else pendulum()
         native = ida_native.open_session(problem, options, 0.0, *PENDULUM_START, tuning=AS_SUNDAE)
-        reference = ida_sundae.open_session(pendulum(), options, 0.0, *PENDULUM_START)
+        reference = scikit_sundae.open_session(pendulum(), options, 0.0, *PENDULUM_START)
         for t in np.linspace(0.0, 1.0, 11):
             mine, theirs = native.advance(t), reference.advance(t)
             assert_allclose(mine.y, theirs.y, rtol=1e-12, atol=1e-12)
@@ -252,7 +263,7 @@ class TestAgreement:
         problem, y, yp = chain(80)
         options = SolverOptions(1e-6, 1e-8, max_order=order, linear_solver="sparse", first_step=1e-5, max_step=0.01)
         native = ida_native.open_session(problem, options, 0.0, y, yp, tuning=AS_SUNDAE)
-        reference = ida_sundae.open_session(problem, options, 0.0, y, yp)
+        reference = scikit_sundae.open_session(problem, options, 0.0, y, yp)
         assert_allclose(native.advance(0.2).y, reference.advance(0.2).y, rtol=1e-12, atol=1e-14)
         assert native.statistics.steps == reference.statistics.steps
         assert native.counts.last_order <= order
@@ -420,7 +431,7 @@ class TestCompiled:
         end = session.advance(5.0)
         helper.join()
         assert flags[2] == 0
-        reference = ida_sundae.open_session(oscillator(), TIGHT, 0.0, np.array([1.0, 0]), np.array([0, -1.0]))
+        reference = scikit_sundae.open_session(oscillator(), TIGHT, 0.0, np.array([1.0, 0]), np.array([0, -1.0]))
         assert_allclose(end.y, reference.advance(5.0).y, rtol=1e-12)
         assert session.statistics.steps == reference.statistics.steps
 

@@ -1,4 +1,4 @@
-"""The driver with compiled equations against the reference: scikit-sundae with equations in Python."""
+"""IDA with compiled equations against the reference: IDA's own options, and equations in Python."""
 
 import numpy as np
 import pytest

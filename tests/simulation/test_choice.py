@@ -12,7 +12,6 @@ from atwood import (
     Point,
     Result,
     Scene,
-    UsageError,
     Vector,
     connector,
     cos,
@@ -242,15 +241,13 @@ def test_a_mode_with_loops_is_followed_by_one_without() -> None:
     assert result.energy.max_drift < 1e-6
 
 
-def test_the_fallback_is_announced(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sundials_library, "available", lambda: False)
-    monkeypatch.setattr(sundials_library, "why_not", lambda: "they are elsewhere")
-    with pytest.warns(UserWarning, match="slower: they are elsewhere"):
-        result = simulate(SCENES["double-pendulum"](), form="dae", level="index1", t_end=0.1, outputs=3)
-    assert solvers(result) == ["ida-sundae"]
-    assert "SUNDIALS IDA through scikit-sundae" in result.solver
-    with pytest.raises(UsageError, match="they are elsewhere"):
-        simulate(SCENES["double-pendulum"](), solver="ida", t_end=0.1)
+def test_missing_libraries_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = sundials_library.SundialsMissing("they are elsewhere")
+    monkeypatch.setattr(sundials_library, "_found", missing)
+    for options in ({"form": "dae", "level": "index1"}, {"solver": "ida"}, {"solver": "ida-sundae"}):
+        with pytest.raises(sundials_library.SundialsMissing, match="they are elsewhere") as found:
+            simulate(SCENES["double-pendulum"](), t_end=0.1, **options)
+        assert "scikit-sundae" in (found.value.advice or "")
     assert solvers(simulate(SCENES["double-pendulum"](), t_end=0.1, outputs=3)) == ["explicit"]
 
 

@@ -53,7 +53,7 @@ def test_a_first_step_is_taken(solver: str) -> None:
     scene = chain((100.0,), (1.0,), 3.0)
     runs = [simulate(scene, solver=solver, t_end=1.0, outputs=3, first_step=one) for one in (1e-12, None)]
     assert runs[0].statistics.steps != runs[1].statistics.steps
-    if solver != "ida":  # which is not asked for single steps
+    if not solver.startswith("ida"):  # which is not asked for single steps
         one = simulate(scene, solver=solver, t_end=1.0, outputs=3, max_steps=1, first_step=1e-7)
         assert one.time[-1] == pytest.approx(1e-7)
     run = simulate(scene, solver=solver, t_end=1.0, outputs=3, first_step=0.5)

@@ -1,1 +1,1 @@
-"""SUNDIALS IDA: driven natively over its shared libraries, and through scikit-sundae as the reference."""
+"""SUNDIALS IDA, driven over its shared libraries."""

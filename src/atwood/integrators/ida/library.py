@@ -1,9 +1,7 @@
-"""The SUNDIALS libraries that the scikit-sundae wheel ships, opened without importing scikit-sundae, and kept quiet.
+"""The SUNDIALS libraries that the scikit-sundae wheel ships, opened without importing scikit-sundae.
 
 Nothing about them is taken for granted: the folder is searched for, the version is asked of the library, and the
 width of its indices is read from scikit-sundae's settings and checked against what the library does.
-scikit-sundae prints what IDA has to say about a failure.  The drivers say it themselves, in the answer they hand
-back, and standard output belongs to the user.
 """
 
 from __future__ import annotations
@@ -14,12 +12,10 @@ import os
 import re
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from ctypes import POINTER, c_double, c_int, c_int32, c_int64, c_long, c_void_p
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from atwood.codegen.sundials.layout import INDEX_BYTES, build_settings
 from atwood.errors import AtwoodError
@@ -37,6 +33,7 @@ _MATRIX_LIBRARIES = (
     "sundials_sunmatrixsparse",
     "sundials_sunlinsoldense",
 )
+_SUPERLU = "sundials_sunlinsolsuperlumt"
 _BELOW_SUPERLU = ("gomp", "omp", "quadmath", "gfortran", "openblas", "openblasp", "sundials_sunmatrixsparse")
 
 _I, _L, _D, _P = "index", POINTER(c_long), c_double, c_void_p
@@ -153,13 +150,13 @@ class SundialsLibrary:
         with self._superlu_lock:
             if self._superlu is None:
                 try:
-                    opened = self._open("sundials_sunlinsolsuperlumt")
+                    opened = self._open(_SUPERLU)
                 except SundialsMissing:
                     # Where a library does not know where its neighbours are, they have to be there before it.
                     for name in _BELOW_SUPERLU:
                         if name in self._files:
                             ctypes.CDLL(str(self._files[name]), mode=ctypes.RTLD_GLOBAL)
-                    opened = self._open("sundials_sunlinsolsuperlumt")
+                    opened = self._open(_SUPERLU)
                 function = opened.SUNLinSol_SuperLUMT
                 function.restype, function.argtypes = _P, [_P, _P, c_int, _P]
                 self._superlu = function
@@ -308,6 +305,9 @@ def _library_files(package: Path) -> dict[str, Path]:
                 files.setdefault(match["name"], path)
         if all(name in files for name in _FREE_OF_CHARGE):
             return files
+    # Elsewhere they are found by what was linked with them.
+    for path in sorted(package.glob("_cy_ida*.so")):
+        return dict.fromkeys((*_FREE_OF_CHARGE, *_MATRIX_LIBRARIES, _SUPERLU), path)
     raise SundialsMissing(f"no SUNDIALS libraries were found near {package}")
 
 
@@ -325,7 +325,10 @@ def library() -> SundialsLibrary:
             except SundialsMissing as error:
                 _found = error
     if isinstance(_found, SundialsMissing):
-        raise _found.with_traceback(None)
+        raise SundialsMissing(
+            f"SUNDIALS IDA cannot be used: {_found.message}",
+            advice="Let scikit-sundae be installed as it comes from PyPI or conda-forge, or choose another solver.",
+        )
     return _found
 
 
@@ -341,48 +344,3 @@ def why_not() -> str:
     except SundialsMissing as error:
         return str(error)
     return ""
-
-
-class _Forwarding:
-    """A text stream that passes everything on except IDA's own messages."""
-
-    def __init__(self, stream: Any) -> None:
-        self.stream = stream
-        self._skip = threading.local()
-
-    def write(self, text: str) -> int:
-        if text.startswith("\n[IDA") and ", Error: " in text:
-            self._skip.newline = True
-            return len(text)
-        if text == "\n" and getattr(self._skip, "newline", False):
-            self._skip.newline = False
-            return 1
-        return cast("int", self.stream.write(text))
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.stream, name)
-
-
-_forwarding_lock = threading.Lock()
-_forwarding_depth = 0
-_forwarding: _Forwarding | None = None
-
-
-@contextmanager
-def without_solver_messages() -> Iterator[None]:
-    """Keep IDA's messages off the standard output; shared by all sessions that are advancing."""
-    global _forwarding, _forwarding_depth
-    with _forwarding_lock:
-        _forwarding_depth += 1
-        if _forwarding_depth == 1 and sys.stdout is not None:
-            _forwarding = _Forwarding(sys.stdout)
-            sys.stdout = cast("Any", _forwarding)
-    try:
-        yield
-    finally:
-        with _forwarding_lock:
-            _forwarding_depth -= 1
-            if _forwarding_depth == 0 and _forwarding is not None:
-                if sys.stdout is cast("Any", _forwarding):
-                    sys.stdout = _forwarding.stream
-                _forwarding = None

@@ -33,6 +33,26 @@ TOO_MUCH_WORK = -1
 STOPPED_BY_WEIGHTS = -22
 """IDA's flag when the error weights are not what they must be, or made it stop between two steps."""
 
+TOO_LONG = (-3, -4)
+"""Flags of IDA that at the start may mean that the first step was far too long, or too short."""
+
+REASONS = {
+    -2: "the tolerances ask for more accuracy than the arithmetic has",
+    -3: "the error test failed too often in a step, or the step became too small",
+    -4: "Newton's iteration failed too often in a step, or the step became too small",
+    -5: "the linear solver could not be set up",
+    -6: "the linear solver failed while factorising the Jacobian",
+    -7: "the linear solver failed",
+    -8: "the residual failed",
+    -9: "the residual has no value near here",
+    -11: "the bounds on the unknowns could not be met",
+    -12: "the residual failed at the start",
+    -14: "the residual or the linear solver failed, and smaller steps did not help",
+    -22: "the solver was given something that it cannot work with",
+    -24: "an error weight became zero: an unknown passed zero and its absolute tolerance is zero",
+}
+"""What IDA's flags say."""
+
 
 @dataclass(frozen=True)
 class Counts:

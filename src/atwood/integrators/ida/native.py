@@ -1,7 +1,7 @@
 """SUNDIALS IDA without Python in the loop: the shared libraries driven directly.
 
 Where a problem brings compiled functions, no Python runs between outputs.  Where it has Python functions only, they
-are called back from C; the answers are the same, and every problem that the reference driver solves is solved here.
+are called back from C; the answers are the same.
 
 IDA goes on by itself to the next output, but only for a moment at a time, so that limits and Ctrl-C have their turn.
 With events or a `~atwood.integrators.protocol.Budget.poll` it takes one step at a time.  Outputs are read from its
@@ -23,11 +23,19 @@ from atwood.errors import KernelEvaluationError, UsageError
 from atwood.integrators.event_location import EventLocator, Root
 from atwood.integrators.ida.callbacks import Record, explain
 from atwood.integrators.ida.library import library
-from atwood.integrators.ida.memory import ONE_STEP, ROOT_RETURN, STOPPED_BY_WEIGHTS, TO_TIME, TOO_MUCH_WORK, Counts
+from atwood.integrators.ida.memory import (
+    ONE_STEP,
+    REASONS,
+    ROOT_RETURN,
+    STOPPED_BY_WEIGHTS,
+    TO_TIME,
+    TOO_LONG,
+    TOO_MUCH_WORK,
+    Counts,
+)
 from atwood.integrators.ida.setup import IdaTuning, prepare
 from atwood.integrators.ida.states import checked_state, is_finite
-from atwood.integrators.ida.sundae import REASONS, TOO_LONG, hardly_moves, other_first_steps
-from atwood.integrators.ida.watchdog import FIRST_CHUNK, Watchdog, first_chunk
+from atwood.integrators.ida.watchdog import FIRST_CHUNK, Watchdog, first_chunk, hardly_moves, other_first_steps
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,

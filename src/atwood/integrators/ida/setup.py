@@ -88,6 +88,10 @@ class IdaTuning:
             raise UsageError(f"stop_time must be finite, not {self.stop_time}")
 
 
+IDAS_OWN = IdaTuning(newton_coefficient=LOOSE_NEWTON, least_growth=_GROWTH, jacobian_age=_AGE)
+"""What IDA does where it is told nothing."""
+
+
 def prepare(
     problem: ImplicitProblem,
     options: SolverOptions,

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import field
 from math import inf
 
+import numpy as np
+
 from atwood.integrators.event_location import ROUNDING
-from atwood.integrators.ida.sundae import STALLED_STEPS
 from atwood.integrators.protocol import paced
 from atwood.lazy_dataclasses import dataclass
 
@@ -21,6 +22,15 @@ _FIRST_COMPILED_CHUNK, _SMALL = 500, 40
 """The same at first with compiled functions, up to so many unknowns; with more of them fewer."""
 
 
+STALLED_STEPS = 50
+"""So many steps in a row that do not move the time beyond rounding are a failure."""
+
+_LONGER = 1e-9
+"""Share of the run that is tried at last for it: IDA itself tries a thousandth and, from there, a millionth of that."""
+
+_MOVES = 1e3
+"""The shortest first step, in roundings of the time: IDA's own is shorter where much begins at once."""
+
 _LAP = 2000
 """Over so many steps it is judged how they get on."""
 
@@ -33,6 +43,19 @@ _TRAPPED, _NO_GROWTH, _RARE_GROWTH = 0.3, 1e6, 4.0
 In what dies away fast, a step of order one that is made longer starts a new transient, and is repeated. IDA looks at
 higher orders only after steps of the same length, so that it stays at the order and at the length of the transient.
 """
+
+
+def other_first_steps(t: float, horizon: float) -> tuple[float, float]:
+    """Return first steps, s, to try where IDA's own fails: it is too long, or too short to move the time.
+
+    The shorter one comes first. In a longer one, which is of order one, a force that acts briefly may be over.
+    """
+    return max(_MOVES * float(np.spacing(abs(t))), 1e-15 * horizon), _LONGER * horizon
+
+
+def hardly_moves(before: float, t: float) -> bool:
+    """Return whether a first step is near the rounding of the time: what it begins with is rounding, too."""
+    return bool(t - before < 0.1 * _MOVES * float(np.spacing(abs(before))))
 
 
 def first_chunk(size: int) -> int:

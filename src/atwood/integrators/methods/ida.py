@@ -1,4 +1,4 @@
-"""SUNDIALS IDA: backward differentiation of variable order, driven directly or through scikit-sundae."""
+"""SUNDIALS IDA: backward differentiation of variable order, with equations as machine code or in Python."""
 
 from __future__ import annotations
 
@@ -6,27 +6,23 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from atwood.integrators.methods.record import Method, Task
+from atwood.lazy_dataclasses import replace
 
 if TYPE_CHECKING:
     from atwood.integrators.session import Session
 
 
-def _open_native(task: Task) -> Session:
+def _open(task: Task, in_python: bool = False) -> Session:
     from atwood.integrators.ida.native import NativeSession
-    from atwood.integrators.ida.setup import IdaTuning
+    from atwood.integrators.ida.setup import IDAS_OWN, IdaTuning
 
     assert task.implicit is not None
     assert task.yp is not None
     tuning = IdaTuning(angle_like=task.angles, stop_time=task.end)
-    return NativeSession(task.implicit(True), task.settings, task.t, task.y, task.yp, task.budget, tuning)
-
-
-def _open_sundae(task: Task) -> Session:
-    from atwood.integrators.ida.sundae import SundaeSession
-
-    assert task.implicit is not None
-    assert task.yp is not None
-    return SundaeSession(task.implicit(False), task.settings, task.t, task.y, task.yp, task.budget)
+    problem = task.implicit(not in_python)
+    if in_python:
+        problem, tuning = replace(problem, native=None, pivots=None), replace(IDAS_OWN, stop_time=task.end)
+    return NativeSession(problem, task.settings, task.t, task.y, task.yp, task.budget, tuning)
 
 
 _ida: Any = partial(
@@ -46,5 +42,7 @@ _ida: Any = partial(
     first_share=0.01,
 )
 
-IDA: Method = _ida("ida", "SUNDIALS IDA", open=_open_native)
-IDA_SUNDAE: Method = _ida("ida-sundae", "SUNDIALS IDA through scikit-sundae", open=_open_sundae, is_interpreted=True)
+IDA: Method = _ida("ida", "SUNDIALS IDA", open=_open)
+IDA_SUNDAE: Method = _ida(
+    "ida-sundae", "SUNDIALS IDA with equations in Python", open=partial(_open, in_python=True), is_interpreted=True
+)

@@ -14,7 +14,6 @@ fast costs IDA more, since only its order two stays stable beside the imaginary 
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING
@@ -28,7 +27,7 @@ from atwood.expr import Expression, depends_on
 from atwood.forms.accelerations import accelerations_of
 from atwood.forms.assembly import Assembly, compiled_columns
 from atwood.forms.caches import Key
-from atwood.integrators.methods import AUTO, EXPLICIT, IDA, IDA_SUNDAE, METHODS, TAYLOR, Method, advise
+from atwood.integrators.methods import AUTO, EXPLICIT, IDA, METHODS, TAYLOR, Method
 from atwood.lazy_dataclasses import dataclass
 from atwood.simulation.events.modes import find_event_functions
 from atwood.simulation.problem.explicit_scene import first_order_rows, program_on_constraints, values_on_constraints
@@ -91,8 +90,6 @@ def check_solver(asked: str) -> None:
     """Refuse a solver that there is not, or that cannot be had."""
     if asked not in (AUTO, *METHODS):
         raise UsageError(f"there is no solver {asked!r}", advice=suggestion(asked, (AUTO, *METHODS)))
-    if asked == IDA.key and (missing := _missing_library()):
-        raise UsageError(f"IDA cannot be driven directly: {missing}", advice=advise(IDA_SUNDAE))
 
 
 def check_asked(options: RunOptions) -> None:
@@ -109,32 +106,13 @@ def check_asked(options: RunOptions) -> None:
             )
 
 
-def implicit_solver() -> str:
-    """Return how IDA is driven, by its key: directly, or through scikit-sundae where its libraries cannot be found.
-
-    The second is said in a warning.
-    """
-    missing = _missing_library()
-    if not missing:
-        return IDA.key
-    warnings.warn(f"running through scikit-sundae, which is slower: {missing}", stacklevel=2)
-    return IDA_SUNDAE.key
-
-
-def _missing_library() -> str:
-    """Return why the libraries of SUNDIALS cannot be used; empty if they can."""
-    from atwood.integrators.ida.library import available, why_not  # explicit runs need none
-
-    return "" if available() else why_not()
-
-
 def choose(plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: FloatArray) -> Choice:
     """Return what solves one mode of a scene, and why."""
     if options.solver != AUTO:
         return Choice(t, options.solver, ASKED)
     assembly = plan.assembly
     if not len(q):
-        return Choice(t, implicit_solver(), "nothing is free to move")
+        return Choice(t, IDA.key, "nothing is free to move")
     if assembly.own_equations.contacts:
         return _choose_on_constraints(plan, options, t, q, u, "gaps and slips hold and let go")
     if assembly.form == "dae":
@@ -143,7 +121,7 @@ def choose(plan: SceneProblem, options: RunOptions, t: float, q: FloatArray, u: 
         return _choose_for_loops(plan, options, t, q, u)
     found = stiffness_of(plan, options, t, q, u)
     if found is not None and found.is_stiff:
-        return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
+        return Choice(t, IDA.key, f"it is stiff: {_in_words(found)}")
     if found is None and options.relative_tolerance <= VERY_ACCURATE and _has_series(assembly):
         reason = f"no constraints are left among its coordinates, nothing dies away, and {VERY_ACCURATE:g} or better"
         return Choice(t, TAYLOR.key, f"{reason} is asked for")
@@ -167,7 +145,7 @@ def _choose_for_loops(plan: SceneProblem, options: RunOptions, t: float, q: Floa
         return _choose_on_constraints(plan, options, t, q, u, "closed loops leave constraints among the coordinates")
     found = stiffness_of(plan, options, t, q, u)
     if found is not None and found.is_stiff:
-        return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
+        return Choice(t, IDA.key, f"it is stiff: {_in_words(found)}")
     names = plan.assembly.reduced.names
     free = ", ".join(names[i].name for i in solved.independent)
     how = f"formulas solve its closed loops, in terms of {free}"
@@ -193,10 +171,10 @@ def _choose_on_constraints(
         or (can_be_stiff(plan.assembly) and len(q) + len(u) > _MANY)
     )
     if is_for_ida:
-        return Choice(t, implicit_solver(), reason)
+        return Choice(t, IDA.key, reason)
     found = stiffness_of(plan, options, t, q, u)
     if found is not None and found.is_stiff:
-        return Choice(t, implicit_solver(), f"it is stiff: {_in_words(found)}")
+        return Choice(t, IDA.key, f"it is stiff: {_in_words(found)}")
     return Choice(t, EXPLICIT.key, f"{reason}, on which steps end, and the problem is not stiff", True)
 
 
@@ -239,7 +217,7 @@ def _can_be_recurrences(assembly: Assembly, solved: Solved | None) -> bool:
 
 def turned_stiff(t: float, found: Stiffness) -> Choice:
     """Return the choice of an implicit method in the middle of a run."""
-    return Choice(t, implicit_solver(), f"it has turned out stiff: {_in_words(found)}")
+    return Choice(t, IDA.key, f"it has turned out stiff: {_in_words(found)}")
 
 
 def _in_words(found: Stiffness) -> str:

@@ -14,7 +14,7 @@ from atwood.arguments import each, instance, takes, whole
 from atwood.errors import AtwoodError
 from atwood.forms.canonical import is_canonical
 from atwood.forms.residuals import LEVELS
-from atwood.integrators.methods import EXPLICIT, GAUSS, METHODS, TSITOURAS
+from atwood.integrators.methods import EXPLICIT, GAUSS, IDA, METHODS, TSITOURAS
 from atwood.integrators.protocol import Statistics
 from atwood.lazy_dataclasses import replace
 from atwood.model.compose.composite import Model
@@ -23,7 +23,6 @@ from atwood.pipeline import assemble_flat
 from atwood.progress import told
 from atwood.result.result import Result
 from atwood.simulation.problem.arguments import FORM, FORMS, LEVEL, LIMITS, NAME, PROGRESS, RTOL, T_END, check_span
-from atwood.simulation.run.choice import implicit_solver
 from atwood.study.comparison.found import Comparison, ComparisonRow, environment
 from atwood.study.comparison.reference import Assembled, Reference, errors_by_part, find_reference, run_form
 from atwood.study.comparison.work import shares_of
@@ -165,20 +164,19 @@ def _kinds(assembled: Assembled, forms: Sequence[str], levels: Sequence[str]) ->
     IDA solves every form, so that form and method are told apart; the explicit method comes on top where it can, and
     the symplectic one where the scene has a Hamiltonian. With gaps and slips there are explicit methods alone.
     """
-    shared = implicit_solver()
     assembly = assembled("dae", "ggl")
     if assembly.maximal.contacts:
         yield from ((form, "", solver.key) for form in forms for solver in (EXPLICIT, TSITOURAS))
         return
     if "reduced" in forms:
-        yield "reduced", "", shared
+        yield "reduced", "", IDA.key
         if assembly.reduced.coordinates:
             yield "reduced", "", EXPLICIT.key
         if is_canonical(assembly):
             yield "reduced", "", GAUSS.key
     if "dae" in forms:
         has_constraints = bool(assembly.maximal.constraints)
-        yield from (("dae", level, shared) for level in (levels if has_constraints else levels[:1]))
+        yield from (("dae", level, IDA.key) for level in (levels if has_constraints else levels[:1]))
         if has_constraints:  # levels say how constraints enter the residual, which explicit steps do not have
             yield "dae", "", EXPLICIT.key
 

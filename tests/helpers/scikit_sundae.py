@@ -1,4 +1,4 @@
-"""SUNDIALS IDA through scikit-sundae: the reference driver.
+"""SUNDIALS IDA through scikit-sundae: what the driver of the framework is compared with.
 
 Every residual is a call back into Python.  IDA takes one internal step at a time; what lies between two steps is
 read from its interpolant, so that outputs and events never change the steps, and so that limits, progress and
@@ -16,10 +16,13 @@ Facts about scikit-sundae that this module rests on:
 
 from __future__ import annotations
 
+import sys
+import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from math import isfinite
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,8 +30,9 @@ from atwood.arrays import FloatArray, IndexArray
 from atwood.errors import KernelEvaluationError
 from atwood.integrators.event_location import ROUNDING
 from atwood.integrators.ida.callbacks import Record
-from atwood.integrators.ida.library import without_solver_messages
+from atwood.integrators.ida.memory import REASONS, TOO_LONG
 from atwood.integrators.ida.states import checked_state
+from atwood.integrators.ida.watchdog import STALLED_STEPS, hardly_moves, other_first_steps
 from atwood.integrators.protocol import (
     Budget,
     ImplicitProblem,
@@ -44,46 +48,50 @@ from atwood.integrators.session import SteppingSession, copied
 from atwood.lazy_dataclasses import replace
 from atwood.lazy_modules import scipy
 
-STALLED_STEPS = 50
-"""So many steps in a row that do not move the time beyond rounding are a failure."""
 
-TOO_LONG = (-3, -4)
-"""Flags of IDA that at the start may mean that the first step was far too long, or too short."""
+class _Forwarding:
+    """A text stream that passes everything on except IDA's own messages."""
 
-_LONGER = 1e-9
-"""Share of the run that is tried at last for it: IDA itself tries a thousandth and, from there, a millionth of that."""
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+        self._skip = threading.local()
 
-_MOVES = 1e3
-"""The shortest first step, in roundings of the time: IDA's own is shorter where much begins at once."""
+    def write(self, text: str) -> int:
+        if text.startswith("\n[IDA") and ", Error: " in text:
+            self._skip.newline = True
+            return len(text)
+        if text == "\n" and getattr(self._skip, "newline", False):
+            self._skip.newline = False
+            return 1
+        return cast("int", self.stream.write(text))
 
-REASONS = {
-    -2: "the tolerances ask for more accuracy than the arithmetic has",
-    -3: "the error test failed too often in a step, or the step became too small",
-    -4: "Newton's iteration failed too often in a step, or the step became too small",
-    -5: "the linear solver could not be set up",
-    -6: "the linear solver failed while factorising the Jacobian",
-    -7: "the linear solver failed",
-    -8: "the residual failed",
-    -9: "the residual has no value near here",
-    -11: "the bounds on the unknowns could not be met",
-    -12: "the residual failed at the start",
-    -14: "the residual or the linear solver failed, and smaller steps did not help",
-    -22: "the solver was given something that it cannot work with",
-    -24: "an error weight became zero: an unknown passed zero and its absolute tolerance is zero",
-}
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
 
 
-def other_first_steps(t: float, horizon: float) -> tuple[float, float]:
-    """Return first steps, s, to try where IDA's own fails: it is too long, or too short to move the time.
-
-    The shorter one comes first. In a longer one, which is of order one, a force that acts briefly may be over.
-    """
-    return max(_MOVES * float(np.spacing(abs(t))), 1e-15 * horizon), _LONGER * horizon
+_forwarding_lock = threading.Lock()
+_forwarding_depth = 0
+_forwarding: _Forwarding | None = None
 
 
-def hardly_moves(before: float, t: float) -> bool:
-    """Return whether a first step is near the rounding of the time: what it begins with is rounding, too."""
-    return bool(t - before < 0.1 * _MOVES * float(np.spacing(abs(before))))
+@contextmanager
+def without_solver_messages() -> Iterator[None]:
+    """Keep IDA's messages off the standard output; shared by all sessions that are advancing."""
+    global _forwarding, _forwarding_depth
+    with _forwarding_lock:
+        _forwarding_depth += 1
+        if _forwarding_depth == 1 and sys.stdout is not None:
+            _forwarding = _Forwarding(sys.stdout)
+            sys.stdout = cast("Any", _forwarding)
+    try:
+        yield
+    finally:
+        with _forwarding_lock:
+            _forwarding_depth -= 1
+            if _forwarding_depth == 0 and _forwarding is not None:
+                if sys.stdout is cast("Any", _forwarding):
+                    sys.stdout = _forwarding.stream
+                _forwarding = None
 
 
 class SundaeSession(SteppingSession):
