@@ -42,9 +42,10 @@ AHEAD = -0.8, 1.6, 13
 """A position is looked for from so far behind to so far ahead of the last look, in strides between looks, at so many
 points: what is just ahead lies between two of them."""
 
-CLEAR, _BETWEEN = 0.075, 5
+CLEAR, _BETWEEN, _BEHIND = 0.075, 5, 16
 """Nothing is found around the least of the looks where at places in so many parts of the ways to those beside it no
-less than this share of the largest measure is left: places, and rest at one, are looked for below two thirds of it."""
+less than this share of the largest measure is left: places, and rest at one, are looked for below two thirds of it.
+Behind a position that was passed it may also rise from place to place, which lie closer where it is small."""
 
 HEADS = 2.0
 """It is looked ahead where the measure would be zero in so many strides at the rate at which it has fallen."""
@@ -66,7 +67,7 @@ _PLACES, _SECTIONS = 8, 20
 
 def write_measures(opened: Opened) -> list[Routine]:
     """Write what measures states, and what judges looks by it."""
-    routines = (_measure, _measures, _between, _is_clear, _judge, _heads)
+    routines = (_measure, _measures, _between, _leaves, _is_clear, _judge, _heads)
     return [_smallest(), *(write(opened) for write in routines)]
 
 
@@ -316,14 +317,35 @@ def _between(opened: Opened) -> Routine:
     r = Routine("between", {"data": ADDRESS, "first": INTEGER}, NUMBER)
     given, first = r.arguments
     data, _, shape = opened(given)
-    one, least, q = data["notes"].at(first * shape.note), r.variable(inf), data["ahead"]
-    other = one.at(shape.note)
+    one, least = data["notes"].at(first * shape.note), r.variable(inf)
     with r.count(_BETWEEN, 1) as k:
-        h, s = other[0] - one[0], k.number() / _BETWEEN
-        write_cubic(r, q, (one.at(1), other.at(1)), (shape.size, shape.coordinates), (h, s))
-        away = r.call("measure", one[0] + s * h, q, given, result=NUMBER)
+        away = _on_way(r, (given, data, shape), one, k.number() / _BETWEEN)
         least.now = r.choose(away >= least.now, least.now, away)
     r.give(least.now)
+    return r
+
+
+def _on_way(r: Routine, of: tuple[Value, dict[str, Value], Record], one: Value, s: Value) -> Value:
+    """Return the measure at a share of the way from a look to the next one, on the cubic through both."""
+    (given, data, shape), other = of, one.at(of[2].note)
+    h, q = other[0] - one[0], data["ahead"]
+    write_cubic(r, q, (one.at(1), other.at(1)), (shape.size, shape.coordinates), (h, s))
+    return r.call("measure", one[0] + s * h, q, given, result=NUMBER)
+
+
+def _leaves(opened: Opened) -> Routine:
+    """Write the function that tells whether the motion leaves a place that it has passed just before the first look."""
+    r = Routine("leaves", {"data": ADDRESS, "limit": NUMBER})
+    given, limit = r.arguments
+    data, _, shape = opened(given)
+    one = data["notes"]
+    before = r.variable(one[shape.measured])
+    with r.count(_BEHIND + 1, 1) as k:
+        share = k.number() / _BEHIND
+        away = _on_way(r, (given, data, shape), one, share * share)
+        r.give_if(~((away > before.now) | (away > limit)), 0)
+        before.now = away
+    r.give(1)
     return r
 
 
@@ -334,15 +356,16 @@ def _is_clear(opened: Opened) -> Routine:
     """
     r = Routine("is_clear", {"data": ADDRESS, "least": INTEGER, "largest": NUMBER})
     given, least, largest = r.arguments
-    data, _, shape = opened(given)
-    end = data["notes"][(least + 1) * shape.note]
+    data, state, shape = opened(given)
+    end, limit = data["notes"][(least + 1) * shape.note], largest * CLEAR
+    with r.when(data["notes"][least * shape.note] == state.behind):
+        r.give(r.call("leaves", given, limit))
     for back in (0, 1):
         with r.when(least > back):
             one, other = (data["notes"].at((least - back - k) * shape.note) for k in (1, 0))
             before, away = one[shape.measured], other[shape.measured]
             there = other[0] + (other[0] - one[0]) * away / (before - away)
             r.give_if((away < before) & (there <= end), 0)
-    limit = largest * CLEAR
     r.give_if(~(data["notes"][least * shape.note + shape.measured] > limit), 0)
     for back in (0, 1):
         with r.when(least >= back):

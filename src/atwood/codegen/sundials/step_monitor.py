@@ -219,6 +219,7 @@ class MonitorData:
     def restart(self) -> None:
         """Forget what was noted; not how much conditions have changed."""
         self._state[[AT["count"], AT["is_low"], AT["falls"], AT["later"], AT["judges"]]] = 0.0
+        self._state[AT["behind"]] = np.nan
         self._arrays["least"][:] = self._arrays["earlier"][:] = np.inf
 
     def judge_from(self, start: float) -> None:
@@ -356,7 +357,7 @@ LISTS = ("kept", "row", "column", "one", "other", "product")
 SHARED = ("derived", "sizes", "right", *LISTS)
 FIELDS = (*_ARRAYS, *LISTS, "notes", "best", "state")
 STATE: tuple[str, ...] = ("next", "count", "is_low", "falls", "later", "move", "whole", "idle", "low", "worn", "best")
-STATE += ("is_small", "judges", "judged", "start", "largest", "stride", "near", "passes")
+STATE += ("is_small", "judges", "judged", "start", "largest", "stride", "near", "passes", "behind")
 SIZES = ("coordinates", "speeds", "size", "conditions", "slopes", "products", "note", "measured", "held")
 """Behind the addresses of the arrays: how many there are of each, see `Shape`, and the address of the conditions."""
 
@@ -464,7 +465,7 @@ def _look() -> Routine:
 def restart_looks(
     r: Routine, look: tuple[Value, Value], of: tuple[dict[str, Value], Record, Value], begin: tuple[Value, Value, Value]
 ) -> None:
-    """Write what begins to look anew from a state, as `MonitorData.restart`, `note`, `settle` and `judge_from` do.
+    """Write what begins to look anew from a state behind a position, as `MonitorData.restart` and others do.
 
     `look` are the addresses of the function that looks and of its data, `of` the arrays, the state and the number of
     conditions, and `begin` time, values and rates.
@@ -476,7 +477,7 @@ def restart_looks(
         data["least"][i] = data["earlier"][i] = np.inf
     r.call(look[0], *begin, look[1])
     r.copy(data["known"], data["pivots"], conditions)
-    state.judges, state.start, state.judged = 1.0, begin[0], -np.inf
+    state.judges, state.start, state.behind, state.judged = 1.0, begin[0], begin[0], -np.inf
 
 
 def _forget(r: Routine, data: dict[str, Value], state: Record, shape: Record) -> None:

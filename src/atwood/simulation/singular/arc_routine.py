@@ -38,6 +38,10 @@ TOO_FAR = 1e3
 LAST = 2
 """What the last so many coefficients add up to tells the error of a polynomial."""
 
+_HOPELESS, _KNOWN = 10.0, 0.03
+"""Once sweeps change less than the second share of that error they change it by less than a half: an arc on which it is
+so many times what is asked for is none to take."""
+
 _SETTLE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 
 _ARRAYS = ("times", "integral", "values", "first", "states", "held", "later", "rates", "integrated", "sizes")
@@ -46,7 +50,7 @@ _COUNTS = ("points", "coordinates", "unknowns", "is_plain")
 ARC: dict[str, Kind] = {
     **dict.fromkeys((*_ARRAYS, *_FUNCTIONS), ADDRESS),
     **dict.fromkeys(_COUNTS, INTEGER),
-    **dict.fromkeys(("settled", "half", "change", "error"), NUMBER),
+    **dict.fromkeys(("settled", "half", "accurate", "change", "error"), NUMBER),
 }
 """What an arc is swept with; the first are the arguments of `Sweeps`."""
 
@@ -67,9 +71,9 @@ class Sweeps:
     coordinates, is_plain
         Their number, and whether the speeds are their rates.
 
-    settle, settled
-        The address of the routine that sweeps, and what the next sweep would change where it ends, relative to the
-        sizes.
+    settle, settled, accurate
+        The address of the routine that sweeps, what the next sweep would change where it ends, and an error from which
+        on an arc is not taken, both relative to the sizes.
 
     Attributes
     ----------
@@ -88,6 +92,7 @@ class Sweeps:
         is_plain: bool,
         settle: int,
         settled: float,
+        accurate: float = np.inf,
     ) -> None:
         times, integral, values, first, states, sizes = (np.ascontiguousarray(one) for one in arrays)
         points, unknowns = states.shape
@@ -97,12 +102,12 @@ class Sweeps:
         self._kept = code, times, integral, values, first, sizes, room
         given = (times, integral, values, first, states, *parts, self.integrated, sizes)
         self._data = np.zeros(len(ARC), dtype=np.int64)
-        self._data[:-4] = [
+        self._data[:-5] = [
             *map(address_of, given),
             *(code.project, code.project_data, code.function, code.data),
             *(points, coordinates, unknowns, is_plain),
         ]
-        self._data[-4:].view(float)[:2] = settled, half
+        self._data[-5:].view(float)[:3] = settled, half, accurate
         self.address = address_of(self._data)
         self._run: Any = _SETTLE(settle)
 
@@ -138,12 +143,13 @@ def _settle() -> Routine:
             r.give(NOWHERE)
         left = r.choose(last.now < np.inf, change * change / last.now, change)  # what the next would change, about
         is_still = r.least(change, 10.0 * left) < m.settled
-        with r.when(is_still | ((change < ROUNDED) & (change >= 0.5 * last.now))):
-            rest = r.variable(0.0)
-            with r.count(m.unknowns) as j:
-                one, other = (m.integrated[(m.points - i) * m.unknowns + j] for i in range(LAST))
-                total = r.size(one) + r.size(other)
-                rest.now = r.most(total / m.sizes[j], rest.now)
+        rest = r.variable(0.0)
+        with r.count(m.unknowns) as j:
+            one, other = (m.integrated[(m.points - i) * m.unknowns + j] for i in range(LAST))
+            total = r.size(one) + r.size(other)
+            rest.now = r.most(total / m.sizes[j], rest.now)
+        is_hopeless = (change < _KNOWN * rest.now) & (rest.now > _HOPELESS * m.accurate)
+        with r.when(is_still | is_hopeless | ((change < ROUNDED) & (change >= 0.5 * last.now))):
             m.error = r.most(r.least(change, left), rest.now)
             r.give(SWEPT)
         last.now = change

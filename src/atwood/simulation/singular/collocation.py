@@ -218,12 +218,13 @@ def sweeps_of(
     times: FloatArray,
     states: FloatArray,
     settled: float = SETTLED,
+    accurate: float = np.inf,
 ) -> Sweeps:
     """Return sweeps by machine code, from coordinates and speeds at the start and guesses at the points."""
     sizes = np.concatenate([plan.coordinate_sizes, plan.sizes / plan.scales.time])
     arrays, kinematic_map = (times, points()[2], _REACH, first, states, sizes), plan.balance.kinematic_map
     settle = singular_routines().code.addresses["settle"]
-    return Sweeps(code, arrays, half, len(plan.coordinate_sizes), kinematic_map.is_plain, settle, settled)
+    return Sweeps(code, arrays, half, len(plan.coordinate_sizes), kinematic_map.is_plain, settle, settled, accurate)
 
 
 def _sweep(

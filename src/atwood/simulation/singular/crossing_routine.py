@@ -36,6 +36,10 @@ NARROWER = 0.3
 CLOSE = 0.1
 """Where less than this share of the largest measure is left behind a place, another one is perhaps just ahead."""
 
+_LONGEST, _SHORTEST, _SAFELY = 0.5, 0.25, 0.1
+"""Where an arc over the place is not accurate, another one before it leads to so large a share of the way: about what
+makes the error of the next so much smaller than it may be, as the twelfth power of the length."""
+
 _TRIES = 8
 """So often an arc is laid anew around the place."""
 
@@ -235,7 +239,7 @@ def _lay() -> Routine:
     r = Routine("lay", {"data": ADDRESS, "end": NUMBER})
     given, end = r.arguments
     way, arc, _, _, _ = _open(given)
-    arc.half = 0.5 * (end - way.start)
+    arc.half, arc.error = 0.5 * (end - way.start), 0.0
     with r.count(POINTS) as i:
         arc.times[i] = way.start + arc.half * (way.points[i] + 1.0)
     with r.count(POINTS, 1) as i, r.when(~(arc.times[i] > arc.times[i - 1])):
@@ -271,7 +275,15 @@ def _around() -> Routine:
     near = r.variable(monitor.near)
     with r.count(_TRIES):
         with r.when(r.call("lay", given, 2.0 * near.now - way.start) != 0):  # perhaps half of the way is not too long
-            end = 0.5 * (way.start + near.now)
+            whole, share = near.now - way.start, r.variable(_LONGEST)
+            with r.forever() as shares:
+                third = share.now * share.now * share.now
+                left = third * third * (third * third)
+                is_short = ~(arc.error * left > _SAFELY * way.accurate)
+                with r.when(is_short | (share.now <= _SHORTEST)):
+                    r.leave(shares)
+                share.now = 0.9 * share.now
+            end = way.start + whole * r.least(1.0 - share.now, 2.0 * share.now)
             with r.when(r.call("lay", given, end) != 0):
                 r.give(nan)
             with r.when(r.call("keep", given, nan) != 0):

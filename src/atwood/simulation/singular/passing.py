@@ -121,7 +121,7 @@ class Passages:
         width, conditions = plan.program.coordinates + plan.program.speeds, monitor.code.shape.conditions
         self._plan, self._monitor, self._width, self._conditions = plan, monitor, width, conditions
         states, settled = np.empty((POINTS, width)), max(SETTLED, _SETTLED * tolerance)
-        self._sweeps = sweeps_of(plan, rates, np.empty(width), 0.0, np.empty(POINTS), states, settled)
+        self._sweeps = sweeps_of(plan, rates, np.empty(width), 0.0, np.empty(POINTS), states, settled, accurate)
         size = len(PASSED) + conditions + (POINTS + 1) * width
         self._log, self._behind = np.empty((min(_MOST, 1 + _ROOM // size), size)), np.empty(2 + width)
         self._look = singular_routines().code.addresses["watch"]
