@@ -5,9 +5,10 @@ Machine code needs LLVM, which is imported when it is first asked for.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from atwood.codegen.python.backend import BoundKernel, CompiledProgram, compile_program
+from atwood.lazy_modules import imports_later
 
 if TYPE_CHECKING:
     from atwood.codegen.llvm.backend import NativeKernel, NativeProgram, compile_native
@@ -24,14 +25,4 @@ __all__ = [
     "compile_program",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name in ("NativeKernel", "NativeProgram", "compile_native"):
-        from atwood.codegen.llvm import backend as llvm_backend
-
-        return getattr(llvm_backend, name)
-    if name in ("IdaCallbacks", "compile_ida_callbacks"):
-        from atwood.codegen.sundials import residuals as llvm_ida
-
-        return getattr(llvm_ida, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = imports_later(__name__)

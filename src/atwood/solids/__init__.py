@@ -5,8 +5,9 @@ Its modules are loaded when a name of theirs is first used: scenes of points and
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
+
+from atwood.lazy_modules import imports_later
 
 if TYPE_CHECKING:
     from atwood.solids.mesh import TriangleMesh, closed_mesh, mesh_solid, stl_solid
@@ -35,22 +36,8 @@ __all__ = [
     "tube",
 ]
 
-_MODULES = {
-    "mesh": ("TriangleMesh", "closed_mesh", "mesh_solid", "stl_solid"),
-    "properties": ("MassProperties", "combine", "point_mass", "subtract"),
-    "shapes": ("box", "cone", "cylinder", "disc", "ellipsoid", "rod", "sphere", "spherical_shell", "tube"),
-    "stl": ("read_stl",),
-}
+__getattr__ = imports_later(__name__)
 
-if not TYPE_CHECKING:  # so that type checkers know which names there are
 
-    def __getattr__(name):
-        for module, names in _MODULES.items():
-            if name in names:
-                found = getattr(importlib.import_module(f"{__name__}.{module}"), name)
-                globals()[name] = found
-                return found
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-    def __dir__():
-        return sorted({*globals(), *__all__})
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
