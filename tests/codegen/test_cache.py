@@ -111,15 +111,6 @@ def test_a_directory_that_cannot_be_written_is_no_error(tmp_path, monkeypatch):
         check(compiled)
 
 
-def test_functions_in_python_are_never_kept(directory):
-    graph = ex.Graph()
-    x = graph.symbol("x")
-    out = ex.external(ex.ExternalFunction("table", lambda v: v * v), x)
-    program = ex.Program("external", (ex.InputGroup("x", (x,)),), (), (ex.OutputGroup("out", (out,)),))
-    assert compile_native(program).bind([])([3.0]) == ([9.0],)
-    assert not directory.exists()
-
-
 def test_what_was_not_used_for_longest_goes_first(tmp_path):
     store = disk.Cache(tmp_path, limit=1000)
     for position, key in enumerate(("a", "b", "c")):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import signal
 import sys
 import weakref
 from typing import Any
@@ -11,8 +10,6 @@ from typing import Any
 import pytest
 from llvmlite import binding
 
-from atwood import expr as ex
-from atwood.codegen import compile_native
 from atwood.codegen.llvm import engine
 
 TEXT = """
@@ -72,27 +69,3 @@ def test_code_that_is_no_longer_used_is_unloaded_with_the_next(monkeypatch: pyte
         made(number)
     gc.collect()
     assert len(engine._graves) <= before + 1
-
-
-def test_ctrl_c_just_as_machine_code_calls_python_is_not_lost() -> None:
-    """The exception would arise in the function of Python before its `try`; ctypes swallows it and returns zero."""
-    graph = ex.Graph()
-    x = graph.symbol("x")
-    square = graph.convert(ex.external(ex.ExternalFunction("square", lambda value: value * value), x))
-    program = ex.Program("demo", (ex.InputGroup("x", (x,)),), (), (ex.OutputGroup("y", (square,)),))
-    kernel = compile_native(program).bind([])
-
-    def send(frame: Any, event: str, _: Any) -> None:
-        if event == "call" and frame.f_code.co_name == "guarded":
-            signal.raise_signal(signal.SIGINT)
-
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
-    tracing = sys.gettrace()
-    try:
-        sys.settrace(send)
-        with pytest.raises(KeyboardInterrupt):
-            kernel([3.0])
-    finally:
-        sys.settrace(tracing)
-        signal.signal(signal.SIGINT, before)
-    assert kernel([3.0]) == ([9.0],)

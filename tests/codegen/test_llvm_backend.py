@@ -37,12 +37,7 @@ _OPERATIONS = (
     lambda a, b: sum(
         ex.solve([[4.0 if i == j else ex.sin(a * i + j) for j in range(5)] for i in range(5)], [a, b, 1, 0, 2])
     ),
-    lambda a, b: ex.external(ex.ExternalFunction("mean", _mean), a, b),
 )
-
-
-def _mean(a, b):
-    return 0.5 * (a + b)
 
 
 _step = st.tuples(st.integers(0, len(_OPERATIONS) - 1), st.integers(0, 30), st.integers(0, 30))
@@ -224,27 +219,9 @@ def test_wrong_sizes_and_arrays_are_explained():
             kernel.into(outputs, *inputs)
 
 
-def test_external_functions_are_called_with_floats_and_their_failure_is_reported():
-    def table(value):
-        assert type(value) is float
-        if value > 5:
-            raise ValueError("beyond the table")
-        if value < -5:
-            raise KeyboardInterrupt
-        return value * value
-
-    function = ex.ExternalFunction("table", table)
-    kernel = make(lambda x, p: [ex.external(function, x) * p + ex.external(function, p)]).bind([2.0])
-    assert kernel([3.0]) == ([22.0],)
-    with pytest.raises(KernelEvaluationError, match="demo: an external function failed: beyond the table"):
-        kernel([6.0])
-    with pytest.raises(KeyboardInterrupt):
-        kernel([-6.0])
-    assert kernel([3.0]) == ([22.0],)
-    with pytest.raises(KernelEvaluationError, match="beyond the table"):
-        kernel.compiled.bind([6.0])
-    choice = make(lambda x, p: [ex.select(x > 5, 1.0, ex.external(function, x))]).bind([2.0])
-    assert choice([6.0]) == ([1.0],)
+def test_functions_in_python_are_refused():
+    with pytest.raises(UnsupportedError, match="there is no machine code for the operation external"):
+        make(lambda x, p: [ex.external(ex.ExternalFunction("table", abs), x) * p])
 
 
 def test_an_operation_without_machine_code_is_named():

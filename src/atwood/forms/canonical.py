@@ -85,7 +85,7 @@ def is_canonical(assembly: Assembly) -> bool:
         found = canonical_programs(assembly)
     except (UnsupportedError, UsageError):
         return False
-    return not any(node.operation == "external" for node in found.equations.nodes)
+    return not found.equations.calls_python
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Programs as machine code that Python calls; the values are those of `atwood.codegen.python.backend`, to rounding.
 
-A call lets other threads run, except while it is inside a function in Python (an external function of the program).
+A call lets other threads run.
 """
 
 from __future__ import annotations
@@ -71,8 +71,6 @@ class NativeProgram:
         self.scratch = built.scratch
         self.from_cache = built.from_cache
         self.call: Callable[..., int] = _KERNEL(built.code.addresses["kernel"])
-        if built.failures is not None:
-            self.call = built.failures.watch(self.call)
 
     def bind(self, parameter_values: ArrayLike) -> NativeKernel:
         """Compute once what depends on parameters alone.
@@ -85,11 +83,9 @@ class NativeProgram:
         Raises
         ------
         KernelEvaluationError
-            If the number of values is wrong, or an external function of parameters alone fails.
+            If the number of values is wrong.
         """
         derived, _ = self.built.derive("kernel", self.program, parameter_values)
-        if self.built.failures is not None:
-            _raise_failure(self.program.name, self.built.failures.take())
         return NativeKernel(self, np.array(parameter_values, dtype=float), derived)
 
 
@@ -124,8 +120,8 @@ class NativeKernel:
                 self._refuse([len(group) for group in groups])
             target[:] = group
         code = self.compiled.call(*space.arguments)
-        if code or self.compiled.built.failures is not None:
-            self._look_into(code, groups, space)
+        if code:
+            self._look_into(groups, space)
         results = tuple(output.tolist() for output in space.outputs)
         self._spaces.append(space)
         return results
@@ -156,8 +152,6 @@ class NativeKernel:
             self._point_to(space, outputs, inputs)
         code = self.compiled.call(*space.elsewhere)
         self._spaces.append(space)
-        if self.compiled.built.failures is not None:
-            _raise_serious(self.compiled.built.failures.take())
         return bool(code == 0)
 
     def again(self, outputs: Sequence[FloatArray], *inputs: FloatArray) -> Callable[[], bool]:
@@ -175,13 +169,10 @@ class NativeKernel:
         """
         space = _Space(self)
         self._point_to(space, outputs, inputs)
-        call, arguments, failures = self.compiled.call, space.elsewhere, self.compiled.built.failures
+        call, arguments = self.compiled.call, space.elsewhere
 
         def evaluate(held: _Space = space) -> bool:  # the space holds the arrays
-            code = call(*arguments)
-            if failures is not None:
-                _raise_serious(failures.take())
-            return bool(code == 0)
+            return bool(call(*arguments) == 0)
 
         return evaluate
 
@@ -225,8 +216,6 @@ class NativeKernel:
                     pointers[i] = (pointers[i] or 0) + step
         space.known = ()
         self._spaces.append(space)
-        if self.compiled.built.failures is not None:
-            _raise_serious(self.compiled.built.failures.take())
         return first
 
     def _point_to(self, space: _Space, outputs: Sequence[FloatArray], inputs: Sequence[FloatArray]) -> None:
@@ -248,15 +237,9 @@ class NativeKernel:
         except IndexError:
             return _Space(self)
 
-    def _look_into(self, code: int, groups: Sequence[Any], space: _Space) -> None:
+    def _look_into(self, groups: Sequence[Any], space: _Space) -> None:
         """Raise the error that explains a result that is not finite."""
         program = self.compiled.program
-        failures = self.compiled.built.failures
-        error = failures.take() if failures is not None else None
-        _raise_serious(error)
-        if not code:
-            return
-        _raise_failure(program.name, error)
         compile_program(program).bind(self.parameter_values)(*groups)
         for group, values in zip(program.outputs, space.outputs, strict=True):
             for position in np.flatnonzero(~np.isfinite(values)):
@@ -309,16 +292,3 @@ def _check_arrays(where: str, kind: str, arrays: Sequence[FloatArray], sizes: Se
                 f"shape {array.shape}",
                 where=where,
             )
-
-
-def _raise_serious(error: BaseException | None) -> None:
-    """Raise what is more than a failure, such as Ctrl-C."""
-    if error is not None and not isinstance(error, Exception):
-        raise error
-
-
-def _raise_failure(where: str, error: BaseException | None) -> None:
-    """Raise what a function in Python raised, with the name of the program."""
-    _raise_serious(error)
-    if error is not None:
-        raise KernelEvaluationError(f"an external function failed: {error}", where=where) from error

@@ -16,7 +16,7 @@ from functools import cache, lru_cache
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,10 +30,9 @@ from atwood.codegen.llvm.engine import (
     load_code,
     target_description,
 )
-from atwood.codegen.llvm.module import CodeOptions, ModuleText, Part, write_module
+from atwood.codegen.llvm.module import CodeOptions, Part, write_module
 from atwood.codegen.routines import own_name
 from atwood.errors import KernelEvaluationError, UnsupportedError
-from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.stages import stage
@@ -93,37 +92,6 @@ _BRIEF = 500
 """The same for programs that are run for short stretches, between which far more is done."""
 
 
-class Failures(threading.local):
-    """The exception that a function in Python raised inside compiled code, in each thread.
-
-    Attributes
-    ----------
-    error
-        The exception, or None.
-    interrupted
-        Whether Ctrl-C came meanwhile.
-    """
-
-    error: BaseException | None = None
-    interrupted: bool = False
-
-    def take(self) -> BaseException | None:
-        """Return the exception and forget it."""
-        error, self.error = self.error, None
-        interrupted, self.interrupted = self.interrupted, False
-        return error or (KeyboardInterrupt() if interrupted else None)
-
-    def watch(self, call: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a compiled function that calls Python, with Ctrl-C put off until it has returned."""
-        from atwood.interrupts import InterruptLater
-
-        def watched(*arguments: Any) -> Any:
-            with InterruptLater(self):
-                return call(*arguments)
-
-        return watched
-
-
 @dataclass(frozen=True)
 class Built:
     """Code that is ready to be called.
@@ -136,14 +104,11 @@ class Built:
         The length of the scratch array that they need.
     from_cache
         Whether nothing had to be compiled.
-    failures
-        What functions in Python raised, if the code calls any.
     """
 
     code: LoadedCode
     scratch: int
     from_cache: bool
-    failures: Failures | None
 
     def derive(self, name: str, program: Program, parameter_values: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return what depends on parameters alone, and the room that the code needs."""
@@ -155,8 +120,6 @@ class Built:
             )
         derived, scratch = np.empty(len(program.prologue)), np.empty(self.scratch)
         prologue: Callable[..., None] = prologue_at(self.code.addresses[f"{name}_prologue"])
-        if self.failures is not None:
-            prologue = self.failures.watch(prologue)
         prologue(address_of(values), address_of(derived), address_of(scratch))
         return derived, scratch
 
@@ -200,8 +163,7 @@ def build_now(
 ) -> Built:
     """Do the same without looking at the clock."""
     names = [*exports, *(name for part in parts for name in (part.name, f"{part.name}_prologue"))]
-    has_externals = any(node.operation == "external" for part in parts for node in part.program.nodes)
-    store = default_cache() if cached and not has_externals else None
+    store = default_cache() if cached else None
     key = key_of(parts, options, routines) if store else ""
     if store is not None:
         found = _from_cache(store, key, names)
@@ -216,14 +178,11 @@ def build_now(
         text = f"{text}\n{print_routines(written)}"
     is_short = module.has_loops and text.count("\n") <= _SMALL
     code = compile_text(text, max(options.level, 1) if is_short else options.level, has_variables=bool(written))
-    failures = Failures() if module.externals else None
-    callbacks = _callbacks(module, failures) if failures is not None else {}
-    addresses = {name: ctypes.cast(call, ctypes.c_void_p).value or 0 for name, call in callbacks.items()}
-    loaded = load_code(code, names, _own_addresses(module.functions) | addresses, tuple(callbacks.values()))
+    loaded = load_code(code, names, _own_addresses(module.functions))
     if store is not None:
         about = {"scratch": module.scratch, "functions": module.functions}
         store.write(key, json.dumps(about).encode() + b"\n" + code)
-    return Built(loaded, module.scratch, False, failures)
+    return Built(loaded, module.scratch, False)
 
 
 def _own_addresses(names: Sequence[str]) -> dict[str, int]:
@@ -243,8 +202,8 @@ def _from_cache(store: Cache, key: str, names: Sequence[str]) -> Built | None:
     line, _, code = content.partition(b"\n")
     try:
         about = json.loads(line)
-        loaded = load_code(code, names, _own_addresses(about["functions"]), ())
-        return Built(loaded, int(about["scratch"]), True, None)
+        loaded = load_code(code, names, _own_addresses(about["functions"]))
+        return Built(loaded, int(about["scratch"]), True)
     except (ValueError, KeyError, TypeError, RuntimeError, UnsupportedError):
         return None
 
@@ -270,29 +229,6 @@ def hash_of_generators(room: Path = Path(__file__).parents[1]) -> str:
                 advice="Install atwood with its sources, or switch the cache of machine code off: ATWOOD_CACHE=0.",
             ) from error
     return total.hexdigest()
-
-
-def _callbacks(module: ModuleText, failures: Failures) -> dict[str, Any]:
-    """Return the functions in Python as functions in C."""
-    found: dict[str, Any] = {}
-    for position, (function, count) in enumerate(module.externals):
-        signature = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * count)
-        found[f"external.{position}"] = signature(_guard(function, failures))
-    return found
-
-
-def _guard(function: ExternalFunction, failures: Failures) -> Callable[..., float]:
-    """Return a function that raises nothing: an exception cannot pass through compiled code."""
-    call = function.function
-
-    def guarded(*arguments: float) -> float:
-        try:
-            return float(call(*arguments))
-        except BaseException as error:
-            failures.error = error
-            return float("nan")
-
-    return guarded
 
 
 _PACKAGE = Path(__file__).parents[2]

@@ -22,8 +22,6 @@ Unit = tuple[Expression, ...]
 _LONGEST, _FEWEST, _LEAST = 150, 8, 100
 """A stretch has at most so many operations; at least so many repeat; together they have at least so many operations."""
 
-_STAYS = frozenset({"solve", "external"})
-
 
 @dataclass(frozen=True)
 class Loop:
@@ -108,7 +106,7 @@ def _signs(units: Sequence[Unit], known: Mapping[int, tuple[str, int]]) -> NDArr
     numbers: dict[object, int] = {}
     signs = np.empty(len(units), dtype=np.int64)
     for at, unit in enumerate(units):
-        if unit[0].operation in _STAYS:
+        if unit[0].operation == "solve":
             signs[at] = -1 - at
             continue
         given: list[object] = []

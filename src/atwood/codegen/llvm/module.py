@@ -43,7 +43,6 @@ from atwood.codegen.llvm.text import (
 from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
-from atwood.expr.core.operations import ExternalFunction
 from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
 
@@ -92,8 +91,6 @@ class ModuleText:
         The length of the scratch array that suits all its functions.
     functions
         The elementary functions that it calls, by their names as operations, and the routines of `ELIMINATION`.
-    externals
-        The functions in Python that it calls, as ``external.0`` and so on, each with its number of arguments.
     has_loops
         Whether operations that repeat are written once.
     """
@@ -101,7 +98,6 @@ class ModuleText:
     text: str
     scratch: int
     functions: tuple[str, ...]
-    externals: tuple[tuple[ExternalFunction, int], ...]
     has_loops: bool
 
 
@@ -154,7 +150,6 @@ def write_module(programs: Sequence[Part], options: CodeOptions) -> ModuleText:
         "\n".join(parts),
         scratch * options.runs,
         tuple(sorted(needs.functions)),
-        tuple(needs.externals),
         has_loops,
     )
 
@@ -419,8 +414,6 @@ def _declarations(needs: Needs, runs: int) -> list[str]:
         kind, given = ("void", ELIMINATION[name]) if name in ELIMINATION else (kind, given)
         given = given or ", ".join(["double"] * OWN_FUNCTIONS[name])
         lines.append(f"declare {kind} @{own_name(name)}({given}) #0")
-    for position, (_, count) in enumerate(needs.externals):
-        lines.append(f"declare double @external.{position}({', '.join(['double'] * count)}) #0")
     for entries, name in needs.tables.items():
         numbers = ", ".join(f"i32 {one}" for one in entries)
         lines.append(f"{name} = internal constant [{len(entries)} x i32] [{numbers}]")

@@ -30,9 +30,9 @@ class TapedProgram(CompiledProgram):
 
     @cached_property
     def _has_tape(self) -> bool:
-        if self.vectorized or self.program.size < _LEAST:
+        if self.vectorized or self.program.size < _LEAST or self.program.calls_python:
             return False
-        return not any(node.operation in ("external", "solve") for node in self.program.nodes)
+        return not any(node.operation == "solve" for node in self.program.nodes)
 
     @cached_property
     def main(self) -> Callable[..., tuple[list[Any], ...]]:

@@ -14,7 +14,6 @@ from dataclasses import field
 from atwood.codegen.routines import own_name
 from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
-from atwood.expr.core.operations import ExternalFunction
 from atwood.lazy_dataclasses import dataclass
 
 OWN_FUNCTIONS: Mapping[str, int] = dict.fromkeys(
@@ -82,14 +81,11 @@ class Needs:
     ----------
     functions
         The elementary functions, by their names as operations, and the routines of `ELIMINATION`.
-    externals
-        The functions in Python, each with its number of arguments and its position among them.
     tables
         Where values lie that a loop cannot count.
     """
 
     functions: set[str] = field(default_factory=set)
-    externals: dict[tuple[ExternalFunction, int], int] = field(default_factory=dict)
     tables: dict[tuple[int, ...], str] = field(default_factory=dict)
 
 
@@ -229,8 +225,6 @@ class Writer:
             self.conditions[node.index] = self._truth(node)
         elif operation in OWN_FUNCTIONS:
             self.values[node.index] = self._call_own(node)
-        elif operation == "external":
-            self.values[node.index] = self._call_external(node)
         elif operation in _OTHER:
             self.values[node.index] = _OTHER[operation](self, node)
         else:
@@ -297,14 +291,6 @@ class Writer:
         self.lines.append(f"  call void @{name}({', '.join(given)}, ptr %sine)")
         return self.put(f"load {self.kind}, ptr %sine")
 
-    def _call_external(self, node: Expression) -> str:
-        if self.runs > 1:
-            raise UnsupportedError(f"there is no machine code in lanes for a function in Python in {node!r}")
-        key = (node.payload, len(node.arguments))
-        position = self.needs.externals.setdefault(key, len(self.needs.externals))
-        arguments = ", ".join(f"double {self.value(argument)}" for argument in node.arguments)
-        return self.put(f"call double @external.{position}({arguments})")
-
 
 def _negate(writer: Writer, node: Expression) -> str:
     return writer.put(f"fneg {writer.kind} {writer.value(node.arguments[0])}")
@@ -347,7 +333,7 @@ _OTHER: dict[str, Callable[[Writer, Expression], str]] = {
     "select": _select,
 }
 
-_ELSEWHERE = frozenset({"constant", "symbol", "solve", "component", "external"})
+_ELSEWHERE = frozenset({"constant", "symbol", "solve", "component"})
 """Operations that need no code, or are written elsewhere."""
 
 

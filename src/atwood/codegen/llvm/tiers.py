@@ -151,7 +151,7 @@ def _build_tapes(parts: Sequence[Part], exports: Sequence[str], routines: Routin
     addresses["evaluate"] = interpreter.code.addresses["evaluate"]
     code = _code_of_tapes(tuple(part.name for part in parts), routines)
     loaded = load_code(code, names, addresses, (interpreter, *tapes.values()))
-    return Built(loaded, max(one.scratch for one in tapes.values()), False, None)
+    return Built(loaded, max(one.scratch for one in tapes.values()), False)
 
 
 @once

@@ -117,7 +117,7 @@ class CompiledProgram:
 
     def _is_compiled(self, name: str) -> bool:
         """Return whether a function is compiled, or is to be: it has run a few times, or calls what walks would not."""
-        return name in vars(self) or self._has_externals or next(self._walks[name], None) is None
+        return name in vars(self) or self.program.calls_python or next(self._walks[name], None) is None
 
     @cached_property
     def _walks(self) -> dict[str, Iterator[int]]:
@@ -127,10 +127,6 @@ class CompiledProgram:
         """Return what counts how often functions are walked through before they are compiled."""
         count = WALKS if self.program.size < LONG else LONG_WALKS
         return {"main": iter(range(count)), "_prologue": iter(range(count))}
-
-    @cached_property
-    def _has_externals(self) -> bool:
-        return any(node.operation == "external" for node in self.program.nodes)
 
     @cached_property
     def _before(self) -> list[Expression]:

@@ -152,7 +152,7 @@ class Callbacks:
     size
         The length of y.
     built
-        The code; its ``failures`` hold what a function in Python raised, which IDA only sees as a missing value.
+        The code.
 
     Attributes
     ----------

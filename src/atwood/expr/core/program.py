@@ -139,6 +139,11 @@ class Program:
         return len(self.nodes)
 
     @cached_property
+    def calls_python(self) -> bool:
+        """Whether it calls functions in Python, which machine code does not."""
+        return any(node.operation == "external" for node in self.nodes)
+
+    @cached_property
     def digest(self) -> str:
         """A hash of what the program computes, independent of the order in which it was written down."""
         return _digest(self)

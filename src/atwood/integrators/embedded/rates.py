@@ -100,7 +100,7 @@ class CompiledAccelerations:
     def __init__(self, program: Program, projection: Program | None = None, is_brief: bool = False) -> None:
         self._programs = {"kernel": program} | ({} if projection is None else {"nearer": projection})
         for one in self._programs.values():
-            if any(node.operation == "external" for node in one.nodes):
+            if one.calls_python:
                 raise UnsupportedError("a program that calls functions in Python has no compiled rates", where=one.name)
         parts = [Part(name, one) for name, one in self._programs.items()]
         _, q, u = (len(group.symbols) for group in program.inputs)

@@ -219,7 +219,7 @@ def _code_of(plan: SceneProblem, t: float, y: FloatArray) -> tuple[SetData, SetC
 
     def make() -> tuple[SetData, SetCode] | None:
         found = None if why_in_python(assembly) else set_data(plan, t, y)
-        if found is None or any(node.operation == "external" for node in found.program.nodes):
+        if found is None or found.program.calls_python:
             return None
         return found, SetCode(found.program)
 

@@ -420,7 +420,7 @@ class EventProbe:
 
         def make() -> EventCode | None:
             program = self.program()
-            if program is None or any(node.operation == "external" for node in program.nodes):
+            if program is None or program.calls_python:
                 return None
             from atwood.codegen.sundials.events import compile_events
 

@@ -206,9 +206,7 @@ def update_code(assembly: Assembly, sampler: Sampler) -> tuple[UpdateCode, dict[
     def make() -> UpdateCode | None:
         reading, called = update_inputs_of(assembly), sorted({i for due in chains for i in due})
         updates = [sampler.updates[i] for i in called]
-        if not all(one.law.options.pure for one in updates):
-            return None
-        if any(node.operation == "external" for node in reading.program.nodes):
+        if reading.program.calls_python or not all(one.law.options.pure for one in updates):
             return None
         try:
             laws = [_Law(one, assembly, reading) for one in updates]

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from atwood.integrators.jumps import JumpCode
     from atwood.mechanics.dynamics.equations import ContactRow
 
-_EXTERNAL: Key[bool] = Key("whether accelerations call functions in Python")
 _COMPILED: Key[CompiledAccelerations] = Key("machine code of accelerations")
 _MANY: Key[RatesOfMany] = Key("machine code of accelerations of runs side by side")
 
@@ -131,7 +130,7 @@ def _once(bind: Callable[[], Callable[[], CompiledRates]]) -> Callable[[], Compi
 
 def _compiled(assembly: Assembly, found: AccelerationProgram, values: FloatArray) -> Callable[[], CompiledRates] | None:
     """Return a factory of compiled rates for sessions, compiled on first use; None if not compilable."""
-    return _once(lambda: compiled_rates(assembly, found).bind(values)) if _compiles(assembly, found) else None
+    return None if found.program.calls_python else _once(lambda: compiled_rates(assembly, found).bind(values))
 
 
 def own_rates(assembly: Assembly) -> tuple[CompiledAccelerations, OwnRates] | None:
@@ -140,7 +139,7 @@ def own_rates(assembly: Assembly) -> tuple[CompiledAccelerations, OwnRates] | No
     None where they cannot be compiled, and where the scene is not one for explicit methods.
     """
     found = accelerations_of(assembly)
-    if found is None or not _compiles(assembly, found):
+    if found is None or found.program.calls_python:
         return None
     code = compiled_rates(assembly, found)
     return code, code.open()
@@ -160,12 +159,6 @@ def own_rates_on_constraints(
 def values_on_constraints(plan: SceneProblem) -> FloatArray:
     """Return the parameters of accelerations and projections where constraints stay."""
     return np.concatenate([plan.assembly.parameter_values, plan.sizes])
-
-
-def _compiles(assembly: Assembly, found: AccelerationProgram) -> bool:
-    """Return whether accelerations can be machine code: they call nothing in Python."""
-    nodes = found.program.nodes
-    return not assembly.shared.get(_EXTERNAL, lambda: any(node.operation == "external" for node in nodes), found)
 
 
 _IMPACTS: Key[JumpCode | None] = Key("machine code of impacts")
@@ -214,7 +207,7 @@ def impact_code(plan: SceneProblem, t: float, y: FloatArray, gaps: Sequence[Cont
             program = impact_program(assembly.flat.name, equations, loose, gaps, assembly.parameters, kept, light)
         except DivisionByExactZeroError:  # no gap moves by a force: where it closes, that is told
             return None
-        return None if any(node.operation == "external" for node in program.nodes) else JumpCode(program)
+        return None if program.calls_python else JumpCode(program)
 
     return assembly.shared.get(_IMPACTS, make, assembly.form, kept, light)
 
@@ -322,6 +315,6 @@ def _compiled_on_constraints(
 
 def _code(program: ConstrainedProgram, is_brief: bool) -> CompiledAccelerations | None:
     """Return the machine code; None where there is none."""
-    if any(node.operation == "external" for node in (*program.accelerations.nodes, *program.projection.nodes)):
+    if program.accelerations.calls_python or program.projection.calls_python:
         return None
     return CompiledAccelerations(program.accelerations, program.projection, is_brief)

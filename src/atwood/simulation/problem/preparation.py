@@ -155,7 +155,7 @@ def announce(assembly: Assembly, not_compilable: str) -> None:
 def _is_obstacle(operation: str) -> bool:
     from atwood.codegen.llvm.text import has_code  # not with this module: code that is cached needs no more of LLVM
 
-    return operation == "external" or not has_code(operation)
+    return not has_code(operation)
 
 
 def _describe(assembly: Assembly, program: Program | None) -> str:

@@ -331,7 +331,7 @@ def _event_code(request: SolverRequest, solved: Solved) -> tuple[Program, EventC
     values = (*own, *(v + s for v, s in zip(ahead, more, strict=True)))
     groups = (*watched.inputs, InputGroup("shift", (*shift, *more)))
     program = Program(f"{watched.name} and events", groups, watched.parameters, (OutputGroup("events", values),))
-    if any(node.operation == "external" for node in program.nodes):
+    if program.calls_python:
         return None
     from atwood.codegen.sundials.events import compile_events
 
