@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from ctypes import c_double, c_int, c_int64, c_void_p
 from enum import IntEnum
+from math import nan
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -382,7 +383,12 @@ class Stepper:
 
     def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
         """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
-        return None
+        if "project_each" not in self._functions or not self._count("project"):
+            return None
+        times, y = np.ascontiguousarray(t), np.ascontiguousarray(y)
+        found, left, moved = np.empty(y.shape), np.empty(len(t), dtype=np.int64), np.empty(len(t))
+        self._call("project_each", *map(address_of, (times, y, found, sizes, left, moved)), len(t))
+        return Nearest(found, left == 0, moved)
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back where something is seen; return whether it can."""
@@ -418,6 +424,35 @@ class Stepper:
 
 SAMPLE_ARGUMENTS = {"times": ADDRESS, "wanted": INTEGER, "ys": ADDRESS, "yps": ADDRESS}
 """What the routine takes behind its session."""
+
+
+PROJECT_ARGUMENTS: Mapping[str, Kind] = {
+    **dict.fromkeys(("times", "given", "ys", "sizes", "left", "moved"), ADDRESS),
+    "count": INTEGER,
+}
+PROJECTS = (*[c_void_p] * 6, c_int64)
+"""What ``project_each`` takes behind its session, and as types of C."""
+
+
+def write_project_each(r: Routine, m: Record) -> Routine:
+    """Write what takes states, one row each, onto the constraints; where that fails, a number that is not zero is left.
+
+    It says by how much of its size one of the unknowns of a state has moved at most; nan where that is no number.
+    """
+    _, times, given, ys, sizes, left, farthest, count = r.arguments
+    project, data, width = m.project, m.project_data, m.size
+    most, total = r.variable(0.0), r.variable(0.0)
+    with r.count(count) as i:
+        before, y = given.at(i * width), ys.at(i * width)
+        most.now = total.now = 0.0
+        r.copy(y, before, width)
+        left.write(i, r.call(project, times[i], y, data).integer(), INTEGER)
+        with r.count(width) as j:
+            moved = r.size(y[j] - before[j]) / sizes[j]
+            most.now, total.now = r.most(moved, most.now), total.now + moved
+        farthest[i] = r.choose(r.is_finite(total.now), most.now, nan)
+    r.give(0)
+    return r
 
 
 def write_sample(r: Routine, m: Record, width: Operand) -> Routine:

@@ -11,14 +11,14 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Callable, Mapping
-from ctypes import c_double, c_int, c_int64, c_void_p
+from ctypes import c_double, c_int, c_void_p
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from atwood.arrays import FloatArray, address_of
+from atwood.arrays import FloatArray
 from atwood.codegen.llvm.build import RoutineSource, once
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Kind, Routine, Value
 from atwood.integrators.embedded.tableau import Tableau
@@ -36,6 +36,7 @@ from atwood.integrators.protocol import (
 from atwood.integrators.stepper import (
     COUNTED,
     LANE_FIELDS,
+    PROJECTS,
     WIDTH,
     Memory,
     Routines,
@@ -231,12 +232,7 @@ class CompiledStepper(Stepper):
 
     def nearest(self, t: FloatArray, y: FloatArray, sizes: FloatArray) -> Nearest | None:
         """Take states, one row each, onto the constraints as steps are; None where none can be taken so."""
-        if self._calls is not None or not self._count("project"):
-            return None
-        times, y = np.ascontiguousarray(t), np.ascontiguousarray(y)
-        found, left, moved = np.empty(y.shape), np.empty(len(t), dtype=np.int64), np.empty(len(t))
-        self._call("project_each", *map(address_of, (times, y, found, sizes, left, moved)), len(t))
-        return Nearest(found, left == 0, moved)
+        return None if self._calls is not None else super().nearest(t, y, sizes)
 
     def set_monitor(self, monitor: StepMonitor) -> bool:
         """Let the motion be looked at, and come back with `Outcome.NOTICED` where something is seen."""
@@ -308,4 +304,4 @@ _FILES = (
 def _routines(pair: Tableau) -> Routines:
     """Return the routines of a pair."""
     source = RoutineSource("integrators.embedded.steps", _FILES, (pair,))
-    return routines_of(source, project_each=(*[c_void_p] * 6, c_int64), shorten=(c_double,))
+    return routines_of(source, project_each=PROJECTS, shorten=(c_double,))

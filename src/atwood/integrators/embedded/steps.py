@@ -16,7 +16,16 @@ from atwood.integrators.embedded.stepper import open_routine
 from atwood.integrators.embedded.tableau import Tableau
 from atwood.integrators.event_location import FIELDS as LOCATOR, FOUND, NO_STATE, ROUNDING, ROWS
 from atwood.integrators.protocol import CROSSED
-from atwood.integrators.stepper import CALM, SAMPLE_ARGUMENTS, STIFF, WIDTH, Memory, write_sample
+from atwood.integrators.stepper import (
+    CALM,
+    PROJECT_ARGUMENTS,
+    SAMPLE_ARGUMENTS,
+    STIFF,
+    WIDTH,
+    Memory,
+    write_project_each,
+    write_sample,
+)
 
 SAFETY = 0.9
 GROWTH, SHRINKAGE = 6.0, 3.0
@@ -511,25 +520,9 @@ def _sample(pair: Tableau) -> Routine:
 
 
 def _project_each(pair: Tableau) -> Routine:
-    """Take states, one row each, onto the constraints; where that fails, a number that is not zero is left.
-
-    It says by how much of its size one of the unknowns of a state has moved at most; nan where that is no number.
-    """
-    states = dict.fromkeys(("times", "given", "ys", "sizes", "left", "moved"), ADDRESS) | {"count": INTEGER}
-    r, m, (times, given, ys, sizes, left, farthest, count) = open_routine(pair, "project_each", states, exported=True)
-    project, data, width = m.project, m.project_data, m.size
-    most, total = r.variable(0.0), r.variable(0.0)
-    with r.count(count) as i:
-        before, y = given.at(i * width), ys.at(i * width)
-        most.now = total.now = 0.0
-        r.copy(y, before, width)
-        left.write(i, r.call(project, times[i], y, data).integer(), INTEGER)
-        with r.count(width) as j:
-            moved = r.size(y[j] - before[j]) / sizes[j]
-            most.now, total.now = r.most(moved, most.now), total.now + moved
-        farthest[i] = r.choose(r.is_finite(total.now), most.now, nan)
-    r.give(0)
-    return r
+    """Take states, one row each, onto the constraints."""
+    r, m, _ = open_routine(pair, "project_each", PROJECT_ARGUMENTS, exported=True)
+    return write_project_each(r, m)
 
 
 def write_routines(pair: Tableau) -> list[Routine]:

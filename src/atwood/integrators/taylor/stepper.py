@@ -45,6 +45,7 @@ from atwood.expr.series.taylor import TaylorPrograms
 from atwood.integrators.protocol import CompiledRates, SolverOptions, StepGuard, absolute_tolerances
 from atwood.integrators.stepper import (
     LANE_FIELDS,
+    PROJECTS,
     WIDTH,
     Counts,
     Memory,
@@ -468,4 +469,4 @@ _ROUTINES = RoutineSource(
 @once
 def _routines() -> Routines:
     """Return the routines of the method."""
-    return routines_of(_ROUTINES)
+    return routines_of(_ROUTINES, project_each=PROJECTS)

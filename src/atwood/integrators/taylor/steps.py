@@ -12,7 +12,14 @@ from collections.abc import Callable, Sequence
 from math import inf
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Lanes, Routine, Value
-from atwood.integrators.stepper import SAMPLE_ARGUMENTS, Memory, number_kind, write_sample
+from atwood.integrators.stepper import (
+    PROJECT_ARGUMENTS,
+    SAMPLE_ARGUMENTS,
+    Memory,
+    number_kind,
+    write_project_each,
+    write_sample,
+)
 from atwood.integrators.taylor.stepper import (
     HIGHEST,
     LANES,
@@ -33,8 +40,14 @@ _REACHED, _USED_UP, _TOO_SMALL, _NO_VALUE, _NO_RATES = range(5)
 
 def write_routines() -> list[Routine]:
     """Write the routines; ``run``, ``interpolate``, ``sample`` and ``begin`` are called from outside."""
-    ends = [_begin(), _run(), _interpolate(), _sample()]
+    ends = [_begin(), _run(), _interpolate(), _sample(), _project_each()]
     return [*ends, _evaluate(), _expand(), _misses(), _guarded(), _held(), *write_inner(1)]
+
+
+def _project_each() -> Routine:
+    """Take states, one row each, onto the constraints."""
+    r, m, _ = open_routine(1, "project_each", PROJECT_ARGUMENTS, exported=True)
+    return write_project_each(r, m)
 
 
 def write_inner(runs: int) -> list[Routine]:

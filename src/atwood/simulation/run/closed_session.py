@@ -15,7 +15,7 @@ from atwood.arrays import FloatArray
 from atwood.errors import UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on, substitute
 from atwood.forms.caches import Key
-from atwood.integrators.explicit_session import OnStiff
+from atwood.integrators.explicit_session import ExplicitSession, OnStiff
 from atwood.integrators.methods import Method, Task
 from atwood.integrators.protocol import LOOSEST, Budget, ExplicitProblem, SolverOptions, Statistics, Status, StepResult
 from atwood.integrators.session import Session
@@ -246,7 +246,8 @@ class ClosedLoopSession(Session):
         )
         session = self._method.open(task)
         if is_kept and problem.compiled is not None and not (directions and problem.compiled_events is None):
-            request.kept.keep(request, self._method, asked, session, lambda _: None, solved)
+            assert isinstance(session, ExplicitSession)
+            request.kept.keep(request, self._method, asked, session, lambda one: session.stop_at(one.end), solved)
         if np.isfinite(longest):
             session.limit_steps(longest)
         return session

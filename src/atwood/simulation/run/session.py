@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Hashable
+from functools import cache
 from operator import is_
 from typing import TYPE_CHECKING
 
@@ -401,9 +402,8 @@ def _opened_with(
     steps = options.relative_tolerance, options.absolute_tolerance, options.first_step, options.max_step, options.order
     asked = options.step, options.max_order, options.impacts, options.nominal, options.conditions
     told = is_loose(plan.assembly), on_stiff is None, request.kept.jumps(plan.assembly), request.kept.is_undisturbed
-    end = request.end if method.kind == "series" and plan.balance.constraints else None  # no series goes beyond it
     seen = plan.program, plan.scales, plan.sizes, plan.finding, request.guard(method)
-    return (method, *scene, *seen), (steps, asked, told, end)
+    return (method, *scene, *seen), (steps, asked, told)
 
 
 def _can_be_kept(problem: ExplicitProblem, method: Method) -> bool:
@@ -463,16 +463,25 @@ class FillingOfSeries:
         The recurrences.
     problem, session
         What the session was opened for, and the session.
+    values
+        The parameters of the recurrences, and of the projection.
+    onto
+        The projection onto constraints; None where there are none.
     """
 
     series: TaylorProblem
     problem: ExplicitProblem
     session: ExplicitSession
+    values: Callable[[SceneProblem], FloatArray] = lambda plan: plan.assembly.parameter_values
+    onto: tuple[CompiledAccelerations, OwnRates] | None = None
 
     def __call__(self, request: SolverRequest) -> None:
         """Give them the parameters of a request, and the time beyond which no step goes."""
-        code, derived = self.series.compiled()
-        derived[:] = code.bind(request.plan.assembly.parameter_values)
+        (code, derived), values = self.series.compiled(), self.values(request.plan)
+        derived[:] = code.bind(values)
+        if self.onto is not None:
+            rates, own = self.onto
+            rates.fill(own, values)
         self.session.stop_at(request.end)
         _fill_events(self.problem, request)
 
@@ -563,10 +572,11 @@ def _open_on_constraints(
     absolute = np.asarray(settings.absolute_tolerances)[: len(y)]
     settings = replace(settings, absolute_tolerances=absolute)
     explicit = _watched(request, problem, method)
-    is_kept = method.tableau is not None and _can_be_kept(explicit, method)
+    is_kept = _can_be_kept(explicit, method)
     own = own_rates_on_constraints(plan, t, y) if is_kept else None
     rates = None if own is None else own[1].rates
-    if own is not None and explicit.compiled_events is not None and kept.jumps(plan.assembly):
+    is_pair = method.tableau is not None
+    if own is not None and is_pair and explicit.compiled_events is not None and kept.jumps(plan.assembly):
         from atwood.simulation.contacts.bounces import bounces_of
         from atwood.simulation.contacts.compiled import sets_of
 
@@ -576,15 +586,21 @@ def _open_on_constraints(
             found = sets = sets_of(plan, probe, t, y, explicit.compiled_events, alone)
             rates = rates if sets is None else sets.compiled
         explicit = replace(explicit, jumps=found)
+    fill: Callable[[SolverRequest], None] | None
     fill = None if own is None else Filling(*own, explicit, values_on_constraints)
     if rates is not None and fill is not None:
         fill(request)
         explicit = replace(explicit, compiled=lambda: rates)
     series, _ = equations_of(request, explicit, (t, y))
+    known = cache(series)
     task = Task(
-        settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit, series=series
+        settings, t, y, budget=request.budget, end=request.end, on_stiff=on_stiff, explicit=explicit, series=known
     )
     opened = method.open(task)
+    if own is not None and not is_pair:
+        assert isinstance(opened, ExplicitSession)
+        onto = () if explicit.project is None else (values_on_constraints, own)
+        fill = FillingOfSeries(known(), explicit, opened, *onto)
     if fill is not None:
         kept.keep(request, method, on_stiff, opened, fill)
     return opened
