@@ -334,3 +334,16 @@ def test_the_limit_of_a_run_holds_for_making_it_again() -> None:
         energy = Result(replace(run, again=again, timings={"integration": used})).energy
         assert len(made) == times
         assert energy.uncertainty > whole.uncertainty
+        assert energy.max_drift > 0.1 > 1e-6 > whole.max_drift  # the drift is that of five outputs, which is said
+        assert energy.uncertainty > 1.2 * energy.max_drift * energy.exchanged
+        assert "the estimated error of the work leave open by" in energy.describe()
+
+
+@pytest.mark.parametrize("number", range(9, 60, 3))
+def test_samples_that_are_too_few_leave_the_whole_work_open(number: int) -> None:
+    """The error was taken to fall by half from 7 to 13 samples, and told as a third of what it was; at 9 as 1/40."""
+    t = np.linspace(0.0, 2.0, number)
+    work, error = integral_of_samples(t, np.sin(20.0 * t) * np.exp(-t))
+    fine = np.linspace(0.0, 2.0, 20 * (number - 1) + 1)
+    known, _ = integral_of_samples(fine, np.sin(20.0 * fine) * np.exp(-fine))
+    assert np.max(np.abs(work - known[::20])) <= error + 1e-12

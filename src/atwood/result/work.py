@@ -28,6 +28,9 @@ _T = TypeVar("_T")
 _CLEAR, _PART = 0.01, 0.1
 """Of the tolerance, and of the drift: an error of the work that is smaller than either of them hides nothing."""
 
+_FALLS = 0.25
+"""An integral converges where twice the samples leave less than this share of its error."""
+
 _SUSPECT = 100.0
 """So many tolerances of drift, where samples may be too few to see what the power does, are looked at more closely."""
 
@@ -35,13 +38,14 @@ _SUSPECT = 100.0
 def integral_of_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
     """Return the integral from the first sample on, of a spline of order up to eight, and its estimated error.
 
-    The error follows from what every second and every fourth sample give.
+    The error follows from what every second and every fourth sample give, where it falls by that; samples too few for it
+    tell no more than how far these are apart.
     """
     whole, half, quarter = _spline(t, values), *(_spline(*_thinned(t, values, stride)) for stride in (2, 4))
     if len(t) < 9:
         return whole, float((t[-1] - t[0]) * np.ptp(values)) if len(t) > 1 else 0.0
     last, before = (_apart(_thinned(t, whole, 2)[1], half), _apart(_thinned(*_thinned(t, whole, 2), 2)[1], quarter))
-    return whole, last * min(1.0, last / before) if before > 0.0 else last
+    return whole, last * last / before if len(t) > 16 and last < _FALLS * before else max(last, before)
 
 
 def _thinned(t: FloatArray, values: FloatArray, stride: int) -> tuple[FloatArray, FloatArray]:
@@ -96,7 +100,7 @@ def find_ledger(
     Work is integrated through the samples where that is accurate enough to tell the drift, which is mostly so. Where it
     is not, the run is made again to see what it did within its steps, since integrals that follow the steps are as
     accurate as the solver itself. The run's limit of time holds for both together: where it is used up, the samples
-    must do, and the ledger's uncertainty says how far they do.
+    must do, and whatever drift they show may be theirs, which the ledger's uncertainty says.
     """
     return replace(_balanced(run, pieces, shown), source=partial(_by_part, run, shown))
 
@@ -128,7 +132,7 @@ def _balanced(run: Run, pieces: Sequence[Piece], shown: NDArray[np.bool_]) -> En
         return ledger
     found = in_its_time(run, lambda: _work_in_steps(run, pieces, nodes_in_steps(run)))
     if found is None:
-        return ledger
+        return replace(ledger, uncertainty=max(ledger.uncertainty, 2.0 * ledger.max_drift * ledger.exchanged))
     work, unsure, swing = found
     return make_ledger(pieces, work, unsure, shown, swing)
 

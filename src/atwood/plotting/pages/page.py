@@ -288,8 +288,7 @@ def _engine_sources() -> Iterator[bytes]:
 
 
 def _facts(result: Result) -> str:
-    ledger = result.energy
-    return f"{result.method}; energy drifts by {ledger.max_drift:.1e} of what is exchanged"
+    return f"{result.method}; energy: {result.energy.describe()}"
 
 
 def _first_shown(result: Result) -> list[str]:
