@@ -146,3 +146,14 @@ def test_what_is_pushed_above_its_limit_goes(above: float, state: int) -> None:
     found = find_states(contacts, [(STICKS, (0.0,))] * 2)
     assert found is not None
     assert found.states == ((STICKS, (0.0,)), (state, (float(state == GOES_ON),)))
+
+
+def test_what_moves_across_the_way_it_rubs_goes_another_way() -> None:
+    """Rubbed to rest along the way it was said to go, it moved square to it, and that contradicted nothing."""
+    units = Unit((0,), False, (0.0,), -1), Unit((1, 2), True, (0.0, 0.0), 0)
+    shares, none = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]), np.zeros(2)
+    contacts = Contacts(np.eye(3), np.array([-10.0, 5.0, 3.0]), units, Limits(none, shares, none, shares))
+    found = find_states(contacts, [(STICKS, (0.0,)), (GOES_ON, (1.0, 0.0))])
+    assert found is not None
+    laws_hold(contacts, found.states, found.forces, found.motions)
+    assert found.forces[1:] == pytest.approx(-5.0 * np.array([5.0, 3.0]) / np.hypot(5.0, 3.0), rel=1e-12)

@@ -654,7 +654,7 @@ def _misses(
         yield math.hypot(*(x + limit * d for x, d in zip(f, state[1], strict=True))), (STICKS, none)
         along = sum(x * d for x, d in zip(a, state[1], strict=True))
         if along <= 0.0:
-            yield -along, (STICKS, none)
+            yield math.hypot(*a), (STICKS, none)
             return
         size = math.hypot(*a)
         across = math.hypot(*(x - along * d for x, d in zip(a, state[1], strict=True)))

@@ -38,8 +38,8 @@ _SUSPECT = 100.0
 def integral_of_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, float]:
     """Return the integral from the first sample on, of a spline of order up to eight, and its estimated error.
 
-    The error follows from what every second and every fourth sample give, where it falls by that; samples too few for it
-    tell no more than how far these are apart.
+    The error follows from what every second and every fourth sample give, where it falls by that; samples that are too
+    few for it tell no more than how far these are apart.
     """
     whole, half, quarter = _spline(t, values), *(_spline(*_thinned(t, values, stride)) for stride in (2, 4))
     if len(t) < 9:

@@ -92,7 +92,7 @@ def _check_slip(
             worst.consider(k, norm(r, f[0] + limit * x, f[1] + limit * y), STICKS)
             along = a[0] * x + a[1] * y
             with r.when(along <= 0.0):
-                worst.consider(k, 0.0 - along, STICKS)
+                worst.consider(k, motion, STICKS)
             with r.otherwise():
                 worst.consider(k, norm(r, a[0] - along * x, a[1] - along * y), GOES_ON, a[0] / motion, a[1] / motion)
     with r.when(~idle & ~goes & ~sticks):

@@ -63,15 +63,17 @@ def _find() -> Routine:
         with r.when(r.call("improve", r.arguments[0]) == 0):
             m.shared = r.choose(m.repeats != 0, 1, m.shared, INTEGER)
             r.give(0)
-    some, after, small = r.variable(False, BOOLEAN), m.row("after"), small_motion(r, m)
+    some, after = r.variable(False, BOOLEAN), m.row("after")
     for way in (1.0, -1.0):  # where slips and gaps move each other; others may be nearer
         allow(True)
         with each_unit(r, m, "chosen") as (k, row, is_pair), r.when((m.unit("slip")[k] != 0.0) & (given[k] == 0.0)):
             a, b, size = size_of_slip(r, row, is_pair, m.row("wanted"))
-            unit = r.choose(is_pair & (size > 0.0), size * way, 1.0)
-            state[k] = float(GOES_ON)
+            has_way = ~is_pair | (size > 0.0)
+            unit = r.choose(is_pair & has_way, size * way, 1.0)
+            state[k] = r.choose(has_way, float(GOES_ON), float(STICKS))
             x[k], y[k] = r.choose(is_pair, a / unit, way), r.choose(is_pair, b / unit, 0.0)
         with r.when(r.call("improve", r.arguments[0]) == 0):
+            small = small_motion(r, m)
             with r.count(m.size) as i, r.when(some.now & (r.size(m.row("motions")[i] - after[i]) > small * SHARED)):
                 r.give(1)
             r.copy(after, m.row("motions"), m.size)

@@ -171,7 +171,6 @@ def _settle() -> Routine:
         rests.now = rests.now & (trigger != float(OPENS)) & (trigger != float(YIELDS))
     with r.when(some.now):
         r.give_if(r.call("find_states", r.arguments[0]) != 0, NO_SET)
-        do_or_return(r, "determined")
         do_or_return(r, "share_forces", rests.now.integer())
     with r.when(repeated.now):
         _look_at_begins(r, m)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from math import inf, sqrt
 
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Routine, Value, Variable
+from atwood.integrators.event_routines import do_or_return
 from atwood.integrators.sets.record import (
     UNDETERMINED,
     Sets,
@@ -18,6 +19,7 @@ from atwood.integrators.sets.record import (
     each_unit,
     is_loose,
     limit_of,
+    norm,
     open_routine,
     product_of,
     size_of_slip,
@@ -145,12 +147,13 @@ def _share() -> Routine:
             state[k], m.unit("next_x")[k], m.unit("next_y")[k] = float(STICKS), 0.0, 0.0
         r.call("meet_states", place)
         tries.now = m.repeats != 0
-        with r.when(tries.now):
+        with r.when(tries.now), r.when(r.call("determined", place) == 0):
             m.shared = 1
             r.give_if(r.call("let_go", place) == 0, 0)
         copy_states(r, m, "next", "found")
         r.call("meet_states", place)
     r.give_if(repeats.now == 0, 0)
+    do_or_return(r, "determined")
     with r.when(tries.now & ~moves.now):  # friction that is at its limit may say how the load is shared
         n = r.variable(0, INTEGER)
         _list(r, m, n, lambda k: m.unit("given")[k] == 0.0)
@@ -186,7 +189,7 @@ def _let_go() -> Routine:
         with each_row(r, m, k) as (_, i):
             most.now = r.most(_alike(m, k, i), most.now)
         state[k] = r.choose(most.now > top.now * NOTHING, float(STICKS), float(OPEN))  # joints hold it
-    _list(r, m, n, lambda k: (m.unit("slip")[k] == 1.0) & (state[k] == float(STICKS)))
+    _list(r, m, n, lambda k: (m.unit("slip")[k] == 1.0) & (state[k] == float(STICKS)) & ~is_loose(r, m, k))
     _list(r, m, n, lambda k: (m.unit("slip")[k] == 0.0) & (state[k] == float(STICKS)))
     least = r.variable(r.call("rank_of_rows", place, CLEAR, result=INTEGER), INTEGER)
 
@@ -268,7 +271,10 @@ def _rank() -> Routine:
 
 
 def _lawful() -> Routine:
-    """Tell whether forces hold what is listed, within the limits of what sticks; 1 where they do not."""
+    """Tell whether forces hold what is listed, within the limits of what sticks, and move nothing else against a law.
+
+    It is 1 where they do not.
+    """
     r, m, (n,) = open_routine("is_lawful", {"n": INTEGER})
     forces, motions, free, size, most = m.row("forces"), m.row("motions"), m.row("wanted"), m.size, r.variable(0.0)
     moves, total = r.variable(0.0), r.variable(0.0)
@@ -288,6 +294,14 @@ def _lawful() -> Routine:
         moved = size_of_slip(r, row, is_pair, motions)[2]
         is_beyond = sticks & (over > most.now * (SHARED * SLACK)) & (m.tried == 0)
         r.give_if((moved > moves.now * (SHARED * SLACK)) | is_beyond, 1)
+    with each_unit(r, m, "chosen") as (k, row, is_pair):  # no gap closes, and what begins to slip goes its way
+        a, b, _ = size_of_slip(r, row, is_pair, motions)
+        x, y, begins = m.unit("next_x")[k], m.unit("next_y")[k], m.unit("given")[k] == 0.0
+        along = r.most(a * x + b * y, 0.0)
+        closes, astray = 0.0 - a, norm(r, a - along * x, b - along * y)
+        goes = begins & (m.unit("next")[k] == float(GOES_ON)) & ~is_loose(r, m, k)
+        beyond = r.choose(m.unit("slip")[k] == 0.0, closes, r.choose(goes, astray, 0.0))
+        r.give_if(beyond > moves.now * (SHARED * SLACK), 1)
     with r.when(m.tried > 1):
         m.tried = m.tried - 1
         r.give(1)

@@ -577,26 +577,36 @@ class _Moment:
             (k for k in holding if is_slip[k] or not soft[self.units[k][0]]), key=lambda k: not is_slip[k]
         )
         some = (gone for count in range(len(loosable) + 1) for gone in combinations(loosable, count))
-        least = self._rank(states)
+        least, rates = self._rank(states), self.rates()
+        free = [k for k in chosen if not is_slip[k] or self.rate(k, rates) <= self.slow[k]]
         for gone in islice(some, MOST_SHARES):
             tried = self._without(states, gone)
-            if self._rank(tried, FIRM) == least and self._is_shared(tried, holding, turned):
+            if self._rank(tried, FIRM) == least and self._is_shared(tried, holding, free, turned):
                 return replace(found, states=tuple(tried[k] for k in chosen))
         at_limits = found.at_limits  # friction that is at its limit may say how the load is shared
-        if at_limits is not None and self._is_shared(self._on_every(chosen, at_limits), holding, turned):
+        if at_limits is not None and self._is_shared(self._on_every(chosen, at_limits), holding, free, turned):
             return at_limits
         raise self._contradiction(REFUSED[UNDETERMINED], chosen, _SHARES)
 
-    def _is_shared(self, states: list[State], holding: list[int], turned: Collection[int]) -> bool:
-        """Return whether the forces that are reported contradict no law, and hold what has to stay."""
+    def _is_shared(self, states: list[State], holding: list[int], begins: list[int], turned: Collection[int]) -> bool:
+        """Return whether the forces that are reported contradict no law, and hold what has to stay.
+
+        Of what may begin to move no gap closes, and no slip goes another way than it rubs.
+        """
         values = self.values
         forces = forces_in(values, states)
         limits, small = values.limits_at(forces)[0], SHARED * SLACK * float(np.max(np.abs(forces)))
         free = values.accelerations()
         moved, moves = free + values.response @ forces, np.abs(free) + np.abs(values.response) @ np.abs(forces)
         held = [row for k in holding for row in self.units[k]]
-        if np.max(np.abs(moved[held]), initial=0.0) > SHARED * SLACK * np.max(moves):
+        slight = SHARED * SLACK * float(np.max(moves))
+        if np.max(np.abs(moved[held]), initial=0.0) > slight:
             return False
+        for k in begins:
+            way, own = np.array(states[k][1]), moved[list(self.units[k])]
+            astray = own - max(0.0, float(own @ way)) * way if states[k][0] == GOES_ON else np.zeros(1)
+            if (np.linalg.norm(astray) if self.layout.is_slip[k] else -own[0]) > slight:
+                return False
         for k, (rows, one) in enumerate(zip(self.units, states, strict=True)):
             own, most = forces[list(rows)], float(limits.static_free[k] + limits.static_shares[k] @ forces)
             most -= 2.0 * small if k in turned else 0.0
