@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 from atwood.errors import ParameterError, check_known, suggestion_in_parts
@@ -61,11 +61,20 @@ def state_program(assembly: Assembly, name: str, expressions: Sequence[Expressio
 
 
 def coordinate_program(
-    assembly: Assembly, name: str, equations: Equations, expressions: Sequence[Expression]
+    assembly: Assembly,
+    name: str,
+    equations: Equations,
+    expressions: Sequence[Expression] | Mapping[str, Sequence[Expression]],
+    **more: Sequence[Expression],
 ) -> Program:
-    """Return a program of (t, q, u) in the coordinates of some equations of an assembly."""
-    outputs = (OutputGroup(name, tuple(expressions)),)
-    return Program(f"{assembly.flat.name} {name}", state_groups(equations), assembly.parameters, outputs)
+    """Return a program of (t, q, u), and more symbols by name, in the coordinates of some equations of an assembly.
+
+    It gives expressions, or groups of these by name.
+    """
+    groups = expressions if isinstance(expressions, Mapping) else {name: expressions}
+    outputs = tuple(OutputGroup(one, tuple(some)) for one, some in groups.items())
+    inputs = (*state_groups(equations), *(InputGroup(one, tuple(some)) for one, some in more.items()))
+    return Program(f"{assembly.flat.name} {name}", inputs, assembly.parameters, outputs)
 
 
 _INTERNAL: Key[InternalReactions | None] = Key("reactions inside bodies")
@@ -118,6 +127,4 @@ def with_reactions(reduced: Equations, maximal: Equations) -> Equations:
 
 def _make(assembly: Assembly, reduced: Equations, maximal: Equations) -> Program:
     positions, speeds = places(reduced, maximal)
-    outputs = (OutputGroup("q", tuple(positions)), OutputGroup("u", tuple(speeds)))
-    name = f"{assembly.flat.name} to maximal coordinates"
-    return Program(name, state_groups(reduced), assembly.parameters, outputs)
+    return coordinate_program(assembly, "to maximal coordinates", reduced, {"q": positions, "u": speeds})

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from atwood.expr import Expression, OutputGroup, Program, jacobian
-from atwood.forms.program import rates_are_speeds, state_groups
-from atwood.forms.quantities import to_maximal
+from atwood.expr import Expression, Program, jacobian
+from atwood.forms.program import rates_are_speeds
+from atwood.forms.quantities import coordinate_program, to_maximal
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.plotting.live.mode import ModeText
 from atwood.simulation.dynamics.kinematic_map import kinematic_map_of, reference_coordinates
@@ -81,9 +81,8 @@ def _conditions(
                 for row, j, moved in tangent.triples:
                     if row == k:
                         found[i, j] = found.get((i, j), equations.graph.zero) + entry * moved
-    outputs = OutputGroup("values", tuple(expressions)), OutputGroup("slopes", tuple(found.values()))
-    program = Program(f"{mode.flat.name} start", state_groups(equations), mode.assembly.parameters, outputs)
-    return program, [i for i, _ in found], [j for _, j in found]
+    groups = {"values": expressions, "slopes": [*found.values()]}
+    return coordinate_program(mode.assembly, "start", equations, groups), [i for i, _ in found], [j for _, j in found]
 
 
 def add_tangent(mode: ModeText) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from atwood.errors import AtwoodError, ParameterError
-from atwood.expr import OutputGroup, Program
-from atwood.forms.program import state_groups
+from atwood.expr import Program
+from atwood.forms.quantities import coordinate_program
 from atwood.model.declare.laws import numbers_in
 from atwood.plotting.live.mode import ModeText, NotLiveError
 from atwood.simulation.events.sampling import Update, evaluated, find_sampler, in_order, update_inputs_of, with_states
@@ -90,5 +90,4 @@ def _traced(mode: ModeText, one: Update) -> Program:
         raise NotLiveError(f"{label} is an update that cannot be written as a formula: {error}") from error
     if len(found) != len(one.sets):
         raise NotLiveError(f"{label} is an update that returns {len(found)} numbers for {len(one.sets)}")
-    outputs = (OutputGroup("sets", found),)
-    return Program(f"{mode.flat.name} ({label})", state_groups(equations), assembly.parameters, outputs)
+    return coordinate_program(assembly, f"({label})", equations, {"sets": found})

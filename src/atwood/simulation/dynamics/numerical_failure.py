@@ -15,10 +15,11 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
-from atwood.expr import Expression, OutputGroup, Program, evaluate, live, vjp
+from atwood.expr import Expression, Program, evaluate, live, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
+from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.build import resolve_signals
 from atwood.mechanics.dynamics.equations import Equations
@@ -225,8 +226,7 @@ def _law_values(assembly: Assembly) -> tuple[list[_Quantity], Program]:
         why = "no reaction agrees with the forces that it causes, as where friction jams or is without bounds"
         quantities.append(_Quantity(path, f"the reaction of the law {law!r}, which a force reads,", why))
         expressions.append(value)
-    outputs = (OutputGroup("laws", tuple(expressions)),)
-    return quantities, Program(f"{assembly.flat.name} laws", state_groups(equations), assembly.parameters, outputs)
+    return quantities, coordinate_program(assembly, "laws", equations, expressions)
 
 
 def _quantities(local: LocalPart, mode: str) -> Iterator[tuple[str, list[Expression]]]:

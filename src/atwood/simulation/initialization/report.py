@@ -15,10 +15,9 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.display import data_of
-from atwood.expr import Expression, OutputGroup, Program, jacobian
+from atwood.expr import Expression, Program, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.forms.program import state_groups
 from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
@@ -260,12 +259,7 @@ class _Bodies:
         entries = jacobian(rates, speeds)
         return (
             coordinate_program(self.assembly, "places", self.equations, places),
-            Program(
-                f"{self.assembly.flat.name} movements of bodies",
-                state_groups(self.equations),
-                self.assembly.parameters,
-                (OutputGroup("jacobian", tuple(entries.entries)),),
-            ),
+            coordinate_program(self.assembly, "movements of bodies", self.equations, {"jacobian": entries.entries}),
             (entries.rows, entries.columns, (len(rates), len(speeds))),
         )
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import StartError
-from atwood.expr import Expression, OutputGroup, Program, depends_on, jacobian, jvp, live
+from atwood.expr import Expression, Program, depends_on, jacobian, jvp, live
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.other_values import no_start_quantity
-from atwood.forms.program import state_groups
+from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.mechanics.outputs.observables import Observable
@@ -61,11 +61,8 @@ def start_conditions(
         unknowns = equations.speeds if of_speeds else equations.coordinates
         expressions = [*constraints, *(one.observable.value for one in targets)]
         entries = jacobian(expressions, list(unknowns)) if expressions else None
-        outputs = (
-            OutputGroup("values", tuple(expressions)),
-            OutputGroup("jacobian", tuple(entries.entries) if entries else ()),
-        )
-        program = Program(f"{assembly.flat.name} start", state_groups(equations), assembly.parameters, outputs)
+        groups = {"values": expressions, "jacobian": entries.entries if entries else ()}
+        program = coordinate_program(assembly, "start", equations, groups)
         places = (tuple(entries.rows), tuple(entries.columns)) if entries else ((), ())
         return Conditions(program, *places, (len(expressions), len(unknowns)))
 

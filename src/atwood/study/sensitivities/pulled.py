@@ -15,6 +15,7 @@ from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.program import state_groups
+from atwood.forms.quantities import coordinate_program
 from atwood.integrators.protocol import StepGuard
 from atwood.lazy_dataclasses import dataclass
 from atwood.study.sensitivities.augmented import Augmented
@@ -190,9 +191,7 @@ def read(assembly: Assembly, expressions: tuple[Expression, ...]) -> Program:
         weights = tuple(graph.symbol(f"weight {k}") for k in range(len(expressions)))
         state = [symbol for one in groups[1:] for symbol in one.symbols]
         found = vjp(expressions, weights, [*state, *assembly.parameters])
-        outputs = [OutputGroup("values", expressions), OutputGroup("state", tuple(found[: len(state)]))]
-        outputs.append(OutputGroup("parameters", tuple(found[len(state) :])))
-        more = InputGroup("weights", weights)
-        return Program(f"{assembly.flat.name} gradients", (*groups, more), assembly.parameters, tuple(outputs))
+        own = {"values": expressions, "state": found[: len(state)], "parameters": found[len(state) :]}
+        return coordinate_program(assembly, "gradients", assembly.own_equations, own, weights=weights)
 
     return assembly.shared.get(_READ, make, expressions)

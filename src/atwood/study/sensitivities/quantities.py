@@ -8,12 +8,12 @@ import numpy as np
 
 from atwood.arrays import FloatArray
 from atwood.errors import UnsupportedError
-from atwood.expr import Expression, InputGroup, OutputGroup, Program, jvp, read_by, substitute
+from atwood.expr import Expression, Program, jvp, read_by, substitute
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
 from atwood.forms.event_program import event_program
 from atwood.forms.program import state_groups
-from atwood.forms.quantities import find_observables
+from atwood.forms.quantities import coordinate_program, find_observables
 from atwood.simulation.dynamics.balance import balance_of
 from atwood.simulation.dynamics.redundancy import find_rank
 from atwood.simulation.dynamics.scales import motion_scales, scene_length
@@ -67,10 +67,9 @@ def derived(assembly: Assembly, expressions: tuple[Expression, ...]) -> Program:
         tangents: dict[Expression, Expression | float] = {}
         for some, moved in zip(symbols, along, strict=True):
             tangents.update(zip(some, moved, strict=True))
-        outputs = OutputGroup("values", expressions), OutputGroup("derivatives", tuple(jvp(expressions, tangents)))
-        more = [InputGroup(name, one) for name, one in zip(("dt", "dq", "du", "dp"), along, strict=True)]
-        name = f"{assembly.flat.name} derivatives of quantities"
-        return Program(name, (*groups, *more), assembly.parameters, outputs)
+        own = {"values": expressions, "derivatives": jvp(expressions, tangents)}
+        more = dict(zip(("dt", "dq", "du", "dp"), along, strict=True))
+        return coordinate_program(assembly, "derivatives of quantities", assembly.own_equations, own, **more)
 
     return assembly.shared.get(_DERIVED, make, expressions)
 

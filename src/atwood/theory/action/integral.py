@@ -12,11 +12,12 @@ from numpy.polynomial import legendre
 from atwood.arguments import instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, UnsupportedError, UsageError, check_known
-from atwood.expr import OutputGroup, Program, jacobian_by_rows, vjp
+from atwood.expr import Expression, Program, jacobian_by_rows, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.forms.lagrangian import lagrangian_along_speeds
-from atwood.forms.program import rates_are_speeds, state_groups
+from atwood.forms.lagrangian import Lagrangian, lagrangian_along_speeds
+from atwood.forms.program import rates_are_speeds
+from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.lazy_modules import sympy
 from atwood.model.compose.composite import Model
@@ -32,7 +33,7 @@ from atwood.theory.hamiltonian.phase_space import as_expression
 PATH = replace(instance("a dictionary of functions of time by path", Mapping), word="PATH=EXPRESSION", is_many=True)
 
 _PROGRAM: Key[Program] = Key("action")
-_SECONDS: Key[Program] = Key("second variation")
+_Groups: TypeAlias = Callable[[Lagrangian], Mapping[str, Sequence[Expression]]]
 _PANELS, _MODES = 64, 8
 _AT_ENDS = 1e-9
 """A direction vanishes at the ends where it is so small, of its largest size."""
@@ -372,54 +373,48 @@ def _of_phase_path(assembly: Assembly, path: Mapping[str, Any], t_end: float | s
     return Action(h.name, total, abs(total - rough), (begin, end), names, at_ends.T, momenta, (first, last), (piece,))
 
 
-def _program(assembly: Assembly) -> Program:
-    """Return the program of (t, q, u) with L, dL/dq and dL/du."""
+def _first(found: Lagrangian, both: Sequence[Expression]) -> list[Expression]:
+    return vjp([found.lagrangian], [found.graph.one], list(both))
+
+
+def _slopes(found: Lagrangian) -> dict[str, Sequence[Expression]]:
+    """Return L, dL/dq and dL/du."""
+    return {
+        "L": [found.lagrangian],
+        "dL/dq": _first(found, found.coordinates),
+        "dL/du": _first(found, found.velocities),
+    }
+
+
+def _seconds(found: Lagrangian) -> dict[str, Sequence[Expression]]:
+    """Return the second derivatives of L by coordinates and speeds."""
+    both = [*found.coordinates, *found.velocities]
+    return {"seconds": jacobian_by_rows(_first(found, both), both)}
+
+
+def _evaluated(
+    assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray, of: _Groups = _slopes
+) -> list[FloatArray]:
+    """Return what is made of L along (t, q, u), a row for each expression."""
 
     def make() -> Program:
         equations = assembly.own_equations
-        found = lagrangian_along_speeds(assembly, equations)
-        value, one = found.lagrangian, [found.graph.one]
-        outputs = (
-            OutputGroup("L", (value,)),
-            OutputGroup("dL/dq", tuple(vjp([value], one, list(found.coordinates)))),
-            OutputGroup("dL/du", tuple(vjp([value], one, list(found.velocities)))),
-        )
-        return Program(f"{assembly.flat.name} (action)", state_groups(equations), assembly.parameters, outputs)
+        return coordinate_program(assembly, "(action)", equations, of(lagrangian_along_speeds(assembly, equations)))
 
-    return assembly.shared.get(_PROGRAM, make, assembly.form, assembly.orientation.kind)
-
-
-def _seconds(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
-    """Return the second derivatives of L by coordinates and speeds at times, shape (2n, 2n, times)."""
-
-    def make() -> Program:
-        equations = assembly.own_equations
-        found = lagrangian_along_speeds(assembly, equations)
-        both = [*found.coordinates, *found.velocities]
-        rows = jacobian_by_rows(vjp([found.lagrangian], [found.graph.one], both), both)
-        outputs = (OutputGroup("seconds", tuple(rows)),)
-        return Program(
-            f"{assembly.flat.name} (second variation)", state_groups(equations), assembly.parameters, outputs
-        )
-
-    program = assembly.shared.get(_SECONDS, make, assembly.form, assembly.orientation.kind)
-    [found] = assembly.kernel(program, vectorized=True)(t[None, :], q, u)
-    size = len(q) + len(u)
-    return np.broadcast_to(np.asarray(found, dtype=float), (size * size, len(t))).reshape(size, size, len(t))
-
-
-def _evaluated(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> list[FloatArray]:
-    found = assembly.kernel(_program(assembly), vectorized=True)(t[None, :], q, u)
-    sizes = 1, len(q), len(u)
-    return [
-        np.broadcast_to(np.asarray(one, dtype=float), (size, len(t))) for one, size in zip(found, sizes, strict=True)
-    ]
+    program = assembly.shared.get(_PROGRAM, make, of, assembly.form, assembly.orientation.kind)
+    found = zip(assembly.kernel(program, vectorized=True)(t[None, :], q, u), program.outputs, strict=True)
+    return [np.broadcast_to(np.asarray(x, dtype=float), (len(group.expressions), len(t))) for x, group in found]
 
 
 def _piece(assembly: Assembly, points: Nodes, q: FloatArray, u: FloatArray) -> _Piece:
     t = points.times.ravel()
     value, slopes, momenta = _evaluated(assembly, t, q, u)
-    return _Piece(points, value[0], slopes, momenta, lambda: _seconds(assembly, t, q, u))
+    return _Piece(points, value[0], slopes, momenta, lambda: _bends(assembly, t, q, u))
+
+
+def _bends(assembly: Assembly, t: FloatArray, q: FloatArray, u: FloatArray) -> FloatArray:
+    size = len(q) + len(u)
+    return _evaluated(assembly, t, q, u, _seconds)[0].reshape(size, size, len(t))
 
 
 _End = tuple[Assembly, FloatArray, FloatArray, FloatArray]
@@ -451,15 +446,9 @@ def _made(pieces: list[_Piece], ends: list[_End]) -> Action:
 
 def _rougher(piece: _Piece) -> float:
     """Return the integral of L by the polynomials through every second point, which errs more."""
-    count = piece.nodes.times.shape[1]
-    points = legendre.leggauss(count)[0]
-    chosen = np.arange(0, count, 2)
-    powers = legendre.legvander(points[chosen], len(chosen) - 1)
-    whole = np.zeros(len(chosen))
-    whole[0] = 2.0  # the integral of each Legendre polynomial
-    weights = np.linalg.solve(powers.T, whole)
-    values = piece.values.reshape(-1, count)[:, chosen]
-    return float(np.sum(0.5 * np.diff(piece.nodes.edges) * (values @ weights)))
+    points, values = legendre.leggauss(COUNT)[0][::2], piece.values.reshape(-1, COUNT)[:, ::2]
+    means = legendre.legfit(points, values.T, len(points) - 1)[0]
+    return float(np.diff(piece.nodes.edges) @ means)
 
 
 COUNT = 12
@@ -484,31 +473,20 @@ class Nodes:
     @property
     def weights(self) -> FloatArray:
         """What the values at the points count in integrals, in one row."""
-        weights = legendre.leggauss(self.times.shape[1])[1]
+        weights = legendre.leggauss(COUNT)[1]
         return np.asarray((0.5 * np.diff(self.edges)[:, None] * weights).ravel())
 
     def integral(self, values: FloatArray) -> float:
         """Return the integral of what has these values at the points, of any shape with as many of them."""
         return float(values.ravel() @ self.weights)
 
-    def derivative(self, values: FloatArray) -> FloatArray:
-        """Return the derivative of the polynomials that have these values at the points between two edges."""
-        count = self.times.shape[1]
-        points, weights = legendre.leggauss(count)
-        table = legendre.legvander(points, count - 1)
-        to_coefficients = (np.arange(count) + 0.5)[:, None] * (table * weights[:, None]).T
-        slopes = legendre.legval(points, legendre.legder(np.eye(count))).T
-        matrix = slopes @ to_coefficients
-        return np.asarray((values.reshape(self.times.shape) @ matrix.T) * (2.0 / np.diff(self.edges))[:, None])
-
-    def derivative_at_ends(self, values: FloatArray) -> FloatArray:
-        """Return the derivatives of the first and the last of these polynomials at the ends."""
-        count = self.times.shape[1]
-        points, weights = legendre.leggauss(count)
-        rows = values.reshape(self.times.shape)[[0, -1]]
-        series = (rows * weights) @ legendre.legvander(points, count - 1) * (np.arange(count) + 0.5)
-        slopes = [legendre.legval(end, legendre.legder(one)) for end, one in zip((-1.0, 1.0), series, strict=True)]
-        return np.asarray(np.array(slopes) * 2.0 / np.diff(self.edges)[[0, -1]])
+    def slopes(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the derivatives of the polynomials that have these values between two edges: there, at both ends."""
+        points = legendre.leggauss(COUNT)[0]
+        series = legendre.legder(legendre.legfit(points, values.reshape(-1, COUNT).T, COUNT - 1))
+        scale = 2.0 / np.diff(self.edges)
+        at_ends = [legendre.legval(end, series[:, k]) * scale[k] for end, k in ((-1.0, 0), (1.0, -1))]
+        return np.asarray(legendre.legval(points, series) * scale[:, None]).ravel(), np.array(at_ends)
 
 
 def panels(edges: FloatArray) -> Nodes:
@@ -532,7 +510,7 @@ def curves_at(given: Mapping[str, Any], names: Sequence[str], nodes: Nodes, wher
         function, derivative = _read(given[name], name)
         values[k], at_ends[k] = _called(function, t, name), _called(function, ends, name)
         if derivative is None:
-            rates[k], end_rates[k] = nodes.derivative(values[k]).ravel(), nodes.derivative_at_ends(values[k])
+            rates[k], end_rates[k] = nodes.slopes(values[k])
         else:
             rates[k], end_rates[k] = _called(derivative, t, name), _called(derivative, ends, name)
     return values, rates, at_ends, end_rates

@@ -288,12 +288,7 @@ def refuse_switches(scene: LinearScene, flow: Flow, kept: Sequence[int]) -> None
     margins = _margins(scene)
     if not margins:
         return
-    program = Program(
-        f"{scene.assembly.flat.name} switches",
-        scene.equations.inputs,
-        scene.assembly.parameters,
-        (OutputGroup("at", margins),),
-    )
+    program = scene.program("switches", {"at": margins}, ())
     kernel, now = scene.assembly.kernel(program), flow.variation
     random = np.random.default_rng(5)
     with np.errstate(all="ignore"):

@@ -12,10 +12,10 @@ from atwood.arguments import Kind, check, each, instance, optional, takes
 from atwood.arrays import FloatArray
 from atwood.display import data_of, fitted, listed
 from atwood.errors import UsageError
-from atwood.expr import Expression, OutputGroup, Program, vjp
+from atwood.expr import Expression, vjp
 from atwood.forms.assembly import Assembly
 from atwood.forms.lagrangian import lagrangian_of
-from atwood.forms.program import state_groups
+from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of
@@ -320,8 +320,7 @@ def along_run(quantities: Quantities, values: Sequence[Expression], result: Resu
     # What a quantity is the sum of, as far as velocities tell: total momenta can be zero.
     terms = [[u * slope for u, slope in zip(e.speeds, vjp([one], [e.graph.one], e.speeds), strict=True)] for one in own]
     flat = [one for row in terms for one in row]
-    outputs = (OutputGroup("values", tuple(own)), OutputGroup("terms", tuple(flat)))
-    program = Program(f"{assembly.flat.name} conserved along a run", state_groups(e), assembly.parameters, outputs)
+    program = coordinate_program(assembly, "conserved along a run", e, {"values": own, "terms": flat})
     pieces, sizes = [], np.zeros(len(own))
     for segment in result.run.segments:
         shown = segment.shown

@@ -23,7 +23,7 @@ from atwood.expr.core.algebra import is_square
 from atwood.expr.core.analysis import dependents, live
 from atwood.expr.core.relations import Relation, TimeRelations
 from atwood.forms.assembly import Assembly
-from atwood.forms.program import state_groups
+from atwood.forms.quantities import coordinate_program
 from atwood.lazy_dataclasses import dataclass, replace
 from atwood.mechanics.dynamics.equations import Equations
 from atwood.numerics.matrices import from_entries, least_norm, to_array
@@ -325,8 +325,7 @@ class Features:
         along = jvp(values, dict(zip(e.coordinates, e.rates, strict=True))) if values else []
         slopes = [one for rate in along for one in vjp([rate], [e.graph.one], [*e.speeds])]
         times = [vjp([value], [e.graph.one], [e.time])[0] for value in values]
-        outputs = OutputGroup("values", tuple(values)), OutputGroup("slopes", (*slopes, *times))
-        program = Program(f"{assembly.flat.name} features", state_groups(e), assembly.parameters, outputs)
+        program = coordinate_program(assembly, "features", e, {"values": values, "slopes": [*slopes, *times]})
         self._kernel = compile_program(program).bind(assembly.parameter_values)
         self._map, self._speeds = kinematic_map_of(assembly, "reduced"), len(e.speeds)
 
