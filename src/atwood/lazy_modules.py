@@ -8,6 +8,8 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from atwood.errors import UsageError
+
 if TYPE_CHECKING:
     import mpmath as mpmath  # type: ignore[import-untyped]
     import scipy as scipy
@@ -37,6 +39,14 @@ else:
             return value
 
     mpmath, scipy, sympy = map(_LazyModule, ("mpmath", "scipy", "sympy"))
+
+
+def needed(name: str, extra: str, what: str = "", where: str = "") -> Any:
+    """Return a module that is optional, or say in words what needs it, and what to install."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise UsageError(f"{what or name} is not installed", where=where, advice=f"pip install {extra}") from error
 
 
 def names_for_checkers(package: str) -> dict[str, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -12,6 +11,7 @@ from typing import Any
 
 import click
 
+from atwood.display import plain
 from atwood.table import WIDTH, Table
 
 
@@ -23,16 +23,10 @@ def print_json(data: Mapping[str, Any]) -> None:
 
 
 def strict(value: Any) -> Any:
-    """Return data as strict JSON knows it."""
-    if isinstance(value, Mapping):
-        return {str(key): strict(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [strict(one) for one in value]
-    if isinstance(value, float):  # NumPy's floats are floats too
-        return float(value) if math.isfinite(value) else None
-    if value is None or isinstance(value, (str, bool, int)):
-        return value
-    return strict(value.item()) if hasattr(value, "item") else str(value)
+    """Return a value as plain data, with None for numbers that are not finite."""
+    import json
+
+    return json.loads(json.dumps(plain(value)), parse_constant=lambda _: None)
 
 
 class Writer:

@@ -116,9 +116,9 @@ class Trajectories(Shown, Mapping[str, FloatArray]):
         UsageError
             If pandas is not installed (``pip install 'atwood[data]'``).
         """
-        from atwood.result.formats.dataset import needed
+        from atwood.result.formats.dataset import of_tables
 
-        pandas, columns = needed("pandas"), self.table(paths)
+        pandas, columns = of_tables("pandas"), self.table(paths)
         table = pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
         table.attrs["units"] = {"time": "s", **{path: self.unit(path) for path in columns}}
         return table

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ from atwood.arguments import TEXT, instance, number, takes
 from atwood.errors import UsageError, suggestion
 from atwood.forms.assembly import Assembly
 from atwood.forms.other_values import Slot, find_slots
+from atwood.lazy_modules import needed
 from atwood.model.compose.composite import Model
 from atwood.pipeline import simulate
 from atwood.plotting.pages.document import pack, page_style, widget_script
@@ -49,10 +49,7 @@ class Viewer:
     def __init__(
         self, scene: Model | Assembly | Result, *, show: str | Sequence[str] = (), sliders: str | Sequence[str] = ()
     ) -> None:
-        if importlib.util.find_spec("anywidget") is None:
-            raise UsageError(
-                "a viewer needs anywidget, which is not installed", advice="pip install 'atwood[notebook]'"
-            )
+        needed("anywidget", "'atwood[notebook]'", "a viewer needs anywidget, which")
         self._shown = show
         self._bounds = dict(map(read_slider, sliders))
         self._first: dict[str, dict[str, float]] = {}

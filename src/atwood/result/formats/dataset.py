@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from atwood.errors import UsageError
+from atwood.display import plain
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import needed
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,32 +100,17 @@ def unique_name(name: str, taken: set[str]) -> str:
 
 def json_text(data: Mapping[str, Any]) -> str:
     """Return plain data as JSON; numbers and arrays of numpy are numbers and lists."""
-    return json.dumps(data, default=_plain)
+    return json.dumps(data, default=plain)
 
 
-def _plain(value: Any) -> Any:
-    """Return what JSON does not know by itself as plain data."""
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, Mapping):
-        return dict(value)
-    return str(value)
-
-
-def needed(name: str) -> Any:
-    """Return a module that is optional."""
-    try:
-        return import_module(name)
-    except ImportError as error:
-        advice = "pip install 'atwood[data]'"
-        raise UsageError(f"tables need {name}, which is not installed", where=name, advice=advice) from error
+def of_tables(name: str) -> Any:
+    """Return pandas or xarray."""
+    return needed(name, "'atwood[data]'", f"tables need {name}, which", name)
 
 
 def to_xarray(data: Dataset) -> Any:
     """Return arrays as an `xarray.Dataset`, with units and meanings as the attributes of the CF conventions."""
-    xarray = needed("xarray")
+    xarray = of_tables("xarray")
     every = {one.path: (one.dimensions, one.values, _attributes(one)) for one in data.variables}
     coordinates = {one.path: every.pop(one.path) for one in data.variables if one.is_coordinate}
     plain = {key: value for key, value in data.about.items() if isinstance(value, (str, int, float))}

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from atwood.arrays import BoolArray, FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.lazy_dataclasses import dataclass
+from atwood.lazy_modules import needed
 from atwood.numerics.near_pairs import near_pairs
 
 _FLAT = 1e-6
@@ -104,15 +105,8 @@ class Shape:
 
 
 def _coal() -> Any:
-    try:
-        import coal
-    except ImportError:
-        raise UsageError(
-            "pairs of bodies that are not both balls are found by coal, which is not installed",
-            where="ConvexContacts",
-            advice="pip install 'atwood[coal]'",
-        ) from None
-    return coal
+    what = "pairs of bodies that are not both balls are found by coal, which"
+    return needed("coal", "'atwood[coal]'", what, "ConvexContacts")
 
 
 def _shape(rows: FloatArray) -> Shape:

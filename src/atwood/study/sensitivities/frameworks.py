@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from atwood.arguments import PATHS, one_of, optional, takes
 from atwood.arrays import FloatArray
 from atwood.errors import SolveError, UsageError
 from atwood.forms.assembly import Assembly
+from atwood.lazy_modules import needed
 from atwood.model.compose.composite import Model
 from atwood.pipeline import SCENE, assembly_of, simulate
 from atwood.result.result import Result
@@ -133,15 +133,8 @@ class RunFunction:
         return np.asarray(adjoint.gradient(every) / scales)
 
 
-def _framework(name: str, advice: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError:
-        raise UsageError(f"{name} is not installed", where=f"as_{name}", advice=advice) from None
-
-
 def _with_jax(one: RunFunction) -> Callable[[Any], Any]:
-    jax = _framework("jax", "pip install jax")
+    jax = needed("jax", "jax", where="as_jax")
     shape = len(one.quantities), len(one.time)
 
     def called(function: Callable[..., FloatArray], like: tuple[int, ...], *given: Any) -> Any:
@@ -163,7 +156,7 @@ def _with_jax(one: RunFunction) -> Callable[[Any], Any]:
 
 
 def _with_torch(one: RunFunction) -> Callable[[Any], Any]:
-    torch = _framework("torch", "pip install torch")
+    torch = needed("torch", "torch", where="as_torch")
 
     def numbers(tensor: Any) -> FloatArray:
         return np.asarray(tensor.detach().cpu().numpy(), dtype=np.float64)

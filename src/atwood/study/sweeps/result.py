@@ -18,7 +18,7 @@ from atwood.display import count_of, data_of, listed
 from atwood.errors import ResultError, check_known, near_matches, suggestion
 from atwood.lazy_dataclasses import dataclass
 from atwood.model.declare.connectors import PATH
-from atwood.result.formats.dataset import Dataset, Variable, needed, to_xarray, unique_name
+from atwood.result.formats.dataset import Dataset, Variable, of_tables, to_xarray, unique_name
 from atwood.table import Shown, Table, facts
 
 if TYPE_CHECKING:
@@ -325,7 +325,7 @@ def as_dataset(sweep: Sweep) -> Dataset:
 
 def as_table(sweep: Sweep) -> Any:
     """Return a sweep as a table of pandas; see `Sweep.to_dataframe`."""
-    pandas, times = needed("pandas"), len(sweep.time)
+    pandas, times = of_tables("pandas"), len(sweep.time)
     index = pandas.MultiIndex.from_product([range(len(sweep)), sweep.time], names=["run", "time"])
     columns = {label: np.repeat(sweep.varied[path], times) for path, label in labels(sweep).items()}
     columns["status"] = np.repeat(np.array(sweep.status), times)

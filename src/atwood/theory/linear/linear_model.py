@@ -19,7 +19,7 @@ from atwood.arrays import ComplexArray, FloatArray
 from atwood.display import data_of
 from atwood.errors import UsageError
 from atwood.lazy_dataclasses import dataclass
-from atwood.lazy_modules import scipy
+from atwood.lazy_modules import needed, scipy
 from atwood.numerics.matrices import least_squares
 from atwood.numerics.rank import decompose, null_space, rank, span
 from atwood.simulation.contacts.chosen import words_text
@@ -171,12 +171,7 @@ class LinearModel(Shown):
         UsageError
             If python-control is not installed.
         """
-        try:
-            import control
-        except ImportError:
-            raise UsageError(
-                "python-control is not installed", advice="Install it: pip install 'atwood[control]'."
-            ) from None
+        control = needed("control", "'atwood[control]'", "python-control")
         names = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
         flat = {kind: [one.replace(".", "_") for one in own] for kind, own in names.items()}
         return control.ss(*self.matrices, **{kind: own for kind, own in flat.items() if own})
