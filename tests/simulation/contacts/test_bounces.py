@@ -469,6 +469,53 @@ def test_a_time_of_rest_says_by_how_much_it_may_be_off(
     assert rest.time == pytest.approx(known, rel=0.0, abs=doubt or 1e-9)
 
 
+def dropped(restitution: tuple[float, float], mass: float, height: float) -> Scene:
+    """Return a ball of 1 kg that falls from 1 m, and one above it."""
+    scene = Scene()
+    ground, floor = scene.add("ground", Ground()), scene.add("floor", PointContact(restitution=restitution[0]))
+    below, above = scene.add("below", PointMass(mass=1.0)), scene.add("above", PointMass(mass=mass))
+    between = scene.add("between", DistanceContact(lower=0.1, restitution=restitution[1]))
+    ends = ((ground.frame, floor.plane), (below.point, floor.point), (below.point, between.a), (above.point, between.b))
+    for one, other in ends:
+        scene.connect(one, other)
+    for name, z in (("below", 1.0), ("above", height)):
+        scene.start.update({f"{name}.position.x": 0.0, f"{name}.position.z": z})
+        scene.start.update({f"{name}.velocity.{axis}": 0.0 for axis in "xz"})
+    return scene
+
+
+@pytest.mark.parametrize("by", ["routine", "python"])
+@pytest.mark.parametrize(
+    ("restitution", "mass", "height", "known", "off"),
+    [
+        ((0.22, 0.37), 3.934, 1.544, 0.5468227739428173, 1e-10),
+        ((0.27, 0.22), 4.694, 1.561, 0.5497453145222659, 1e-10),
+        ((0.44, 0.4), 5.43, 1.724, 0.5896403517925674, 2e-5),
+        ((0.6, 0.32), 5.44, 2.075, 0.6611587689524885, 2e-5),
+        ((0.75, 0.77), 5.921, 1.853, 1.2287772744073808, 2e-4),
+    ],
+)
+def test_two_gaps_whose_impacts_accumulate_in_turn_rest_at_once(
+    restitution: tuple[float, float],
+    mass: float,
+    height: float,
+    known: float,
+    off: float,
+    by: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two balls fall on each other; intervals of both alternate, or swing for ever; known from impacts in 60 digits."""
+    if by == "python":
+        in_python(monkeypatch)
+    result = simulate(dropped(restitution, mass, height), t_end=known + 0.1, rtol=1e-10)
+    *_, rest = (one for one in result.events if one.kind == "rests")
+    assert rest.time == pytest.approx(known, rel=0.0, abs=off)
+    _, _, doubt = rest.message.partition("may be off by ")
+    assert abs(rest.time - known) <= max(1e-10, float(doubt.removesuffix(" s") or 0.0))
+    assert result["above.position.z"][-1] == pytest.approx(0.1, abs=1e-7)
+    assert not np.any(result["floor.gap"] < -1e-8)
+
+
 def tilted_box() -> Scene:
     """Return a box that falls on a corner; the second comes to rest beside one that has."""
     scene = Scene()

@@ -24,7 +24,7 @@ from atwood.integrators.sets.record import (
     open_routine,
     product_of,
 )
-from atwood.integrators.sets.sizes import GAIN
+from atwood.integrators.sets.sizes import APART, GAIN
 from atwood.numerics.contact_sets import STICKS
 
 
@@ -165,6 +165,10 @@ def _collide() -> Routine:
     coming = r.variable(False, BOOLEAN)
     with r.count(CAPACITY):
         r.call("touching", r.arguments[0], result=INTEGER)
+        with each_unit(r, m, "chosen") as (k, row, _), r.when(m.in_turn != 0):  # one after the other
+            is_now = (m.unit("state")[k] == float(STICKS)) | (m.unit("trigger")[k] != 0.0)
+            is_near = m.result("values")[row] <= m.unit("rounding")[k] * APART
+            chosen[k] = r.choose(is_now | is_near, 1.0, 0.0)
         coming.now = False
         with r.count(m.count) as k:
             struck[k] = chosen[k]

@@ -18,7 +18,7 @@ FIELDS: dict[str, Kind] = {
     **dict.fromkeys(("finite", "blur", "pace", "tolerance", "inside", "ahead", "rough", "later"), NUMBER),
     **dict.fromkeys(("better_x", "better_y", "lasted", "slack"), NUMBER),
     **dict.fromkeys(("count", "size", "entries", "coordinates", "speeds", "number", "better"), INTEGER),
-    **dict.fromkeys(("logged", "known", "stops", "told", "repeats", "shared", "tried"), INTEGER),
+    **dict.fromkeys(("logged", "known", "stops", "told", "repeats", "shared", "tried", "in_turn"), INTEGER),
 }
 """The memory of sets; the files of the routines say what of it is theirs.
 
@@ -29,7 +29,8 @@ go on that are summed, and then how long they do, `rough` how long where roundin
 and may still wait for one more, 2 where they come to an end, `told` which gap is said to rest then. `shared` is 1 where
 forces of a set that was found are not determined, as rows repeat each other, or where another share might let rest what
 begins to slip, and `repeats` where those solved for last are not. `tried` is 0, or which share that holds everything is
-taken whatever its forces are here: joints have a part in those that are reported.
+taken whatever its forces are here: joints have a part in those that are reported. `in_turn` is 1 where impacts of
+several gaps accumulate in turn.
 """
 
 UNITS = {

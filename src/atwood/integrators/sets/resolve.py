@@ -212,7 +212,7 @@ def _check() -> Routine:
 def _resolve() -> Routine:
     """Find what becomes of gaps and slips at a moment: the speeds change, and the states after it are written."""
     r, m, (t, checks, sums) = open_routine("resolve", {"t": NUMBER, "checks": INTEGER, "sums": INTEGER}, exported=True)
-    m.finite, m.blur, m.pace, m.logged, m.stops, m.shared = 1.0, 1.0, 1.0, 0, 0, 0
+    m.finite, m.blur, m.pace, m.logged, m.stops, m.shared, m.in_turn = 1.0, 1.0, 1.0, 0, 0, 0, 0
     do_or_return(r, "read_contacts", t)
     series, pressed = m.unit("series"), m.row("pressed")
     r.clear(series, series.at(m.count))

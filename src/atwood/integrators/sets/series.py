@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf
 
-from atwood.codegen.routines import BOOLEAN, INTEGER, NUMBER, Routine, Value
+from atwood.codegen.routines import BOOLEAN, INTEGER, NUMBER, Routine, Value, Variable
 from atwood.integrators.sets.record import CLOSES, Sets, each_row, open_routine
 from atwood.integrators.sets.sizes import BLURRED, NEAR_REST, ROUNDED, STEP
 from atwood.numerics.contact_sets import STICKS
@@ -28,6 +28,12 @@ EVEN = 4.0
 
 STEADY, LATER = 1.5, 0.001
 """Where factors differ by more than the first from their mean, a series is summed later: at this share of its rest."""
+
+IN_TURN = 1.02
+"""The same of impacts of gaps in turn, whose intervals may swing about their mean for long: these are alike or not."""
+
+ACCUMULATE = 0.5
+"""Impacts of gaps in turn accumulate where as many take less than this share of the time that those before took."""
 
 LEVEL, SHORT = 0.97, 4.0
 """Intervals that do not shrink, by more than the first, and are so many times those of uneven ones, are rounding."""
@@ -60,7 +66,7 @@ _MOVED = 1e-12
 def _series() -> Routine:
     """Find in how long impacts that follow each other ever faster have come to an end; see `_Moment.left_of`."""
     r, m, (t,) = open_routine("series", {"t": NUMBER}, result=None)
-    closing, past, response = r.variable(-1, INTEGER), m.past, m.result("response")
+    closing, response = r.variable(-1, INTEGER), m.result("response")
     m.stops = 0
     with r.count(m.count) as i:
         k = m.count - 1 - i
@@ -71,31 +77,79 @@ def _series() -> Routine:
     moved = response.at(row * m.size)
     with r.count(m.size) as j:
         largest.now = r.most(r.size(moved[j]), largest.now)
-    spans, turn = r.array(LONG), r.variable(m.known, INTEGER)
-    count, last, end, counts = r.variable(0, INTEGER), r.variable(t), r.variable(inf), r.variable(False, BOOLEAN)
-    with r.forever() as loop:
-        with r.when((turn.now == 0) | (count.now == LONG)):
-            r.leave(loop)
-        turn.now = turn.now - 1
-        time, part = past[turn.now * 2], past[turn.now * 2 + 1]
-        counts.now = False
-        with r.count(m.count) as k, r.when(m.unit("part")[k] == part), each_row(r, m, k) as (_, i):
-            counts.now = counts.now | (r.size(moved[i]) > largest.now * _MOVED)
-        with r.when(~counts.now | (time == end.now)):
-            r.repeat(loop)
-        end.now = time
-        span = last.now - time
-        newer = spans[r.choose(count.now > 0, count.now - 1, 0, INTEGER)]
-        with r.when((count.now > 0) & (span <= newer * LEVEL)):
-            r.leave(loop)
-        spans[count.now] = span
-        count.now, last.now = count.now + 1, time
+    spans = r.array(LONG)
+    count, others, late, early = _intervals(r, m, spans, t, (closing.now, moved, largest.now * _MOVED))
+    newest = (spans[0] + r.choose(count.now > 1, spans[1], 0.0)) * 0.5
+    with r.when(others & ~_is_alike(r, spans, count.now, RECENT)):  # in turn, each after an interval of its own
+        count.now = r.truncated(count.now.number() * 0.5)
+        with r.count(count.now) as k:
+            spans[k] = spans[k * 2] + spans[k * 2 + 1]
+    m.in_turn = (others & (late < early * ACCUMULATE)).integer()
+    with r.when(m.in_turn != 0), r.when(~_is_alike(r, spans, count.now, RECENT // 2)):  # they swing
+        size = r.least(newest, late * (1.0 / (RECENT * SQUEEZED))) * r.size(m.row("rates")[row])
+        r.give_if(size > m.unit("small")[closing.now])
+        left = late * late / (early - late)
+        m.stops = r.choose(left > m.ahead * WAITS, 1, 2, INTEGER)
+        m.ahead, m.blur, m.pace, m.lasted = left, NEAR_REST, NEAR_REST, late + early
+        _mark_series(r, m, t)
+        r.give()
     r.give_if((count.now < SPANS[0]) | ~(spans[0] > 0.0))
-    _end_series(r, m, spans, count.now, (t, closing.now, largest.now * _MOVED))
+    _end_series(r, m, (spans, count.now, others), (t, closing.now, largest.now * _MOVED))
     with r.when(m.stops != 0):
         _mark_series(r, m, t)
     r.give()
     return r
+
+
+def _intervals(
+    r: Routine, m: Sets, spans: Value, t: Value, closing: tuple[Value, Value, Value]
+) -> tuple[Variable, Value, Value, Value]:
+    """Find the intervals between impacts as long as they shrink, the last first, and return how many these are.
+
+    Also whether one of the last was of another gap that does not rest, and how long the last took, and as many before.
+    `closing` is the gap that closes, its responses, and what moves less does not move with it.
+    """
+    past, turn, seen, moved = m.past, r.variable(m.known, INTEGER), r.variable(0, INTEGER), closing[1]
+    count, last, end, counts = r.variable(0, INTEGER), r.variable(t), r.variable(inf), r.variable(False, BOOLEAN)
+    shrinks, others, is_own = r.variable(True, BOOLEAN), r.variable(False, BOOLEAN), r.variable(True, BOOLEAN)
+    late, whole, own = r.variable(0.0), r.variable(0.0), m.unit("part")[closing[0]]
+    rests = r.variable(False, BOOLEAN)
+    with r.forever() as loop:
+        with r.when((turn.now == 0) | ~shrinks.now & (seen.now >= 2 * RECENT)):
+            r.leave(loop)
+        turn.now = turn.now - 1
+        time, part = past[turn.now * 2], past[turn.now * 2 + 1]
+        counts.now, rests.now = False, part == own
+        with r.count(m.count) as k, r.when(m.unit("part")[k] == part):
+            rests.now = rests.now | (m.unit("slip")[k] == 0.0) & (m.unit("state")[k] == float(STICKS))
+            with each_row(r, m, k) as (_, i):
+                counts.now = counts.now | (r.size(moved[i]) > closing[2])
+        is_own.now = is_own.now | counts.now & (time == end.now) & rests.now
+        with r.when(~counts.now | (time == end.now)):
+            r.repeat(loop)
+        others.now = others.now | (seen.now < SPANS[0]) & ~is_own.now
+        end.now, seen.now, is_own.now = time, seen.now + 1, rests.now
+        span = last.now - time
+        newer, older = (spans[r.choose(count.now > by, count.now - 1 - by, 0, INTEGER)] for by in range(2))
+        least = r.choose(others.now, r.least(newer, older), newer)
+        shrinks.now = shrinks.now & (count.now < LONG) & ~((count.now > 0) & (span <= least * LEVEL))
+        with r.when(shrinks.now):
+            spans[count.now] = span
+            count.now = count.now + 1
+        last.now = time
+        late.now = r.choose(seen.now == RECENT, t - time, late.now)
+        whole.now = r.choose(seen.now == 2 * RECENT, t - time, whole.now)
+    others.now = others.now | (seen.now < SPANS[0]) & ~is_own.now
+    return count, others.now, late.now, whole.now - late.now
+
+
+def _is_alike(r: Routine, spans: Value, number: Value, count: int) -> Value:
+    """Tell whether so many of the last intervals are shorter than those before by one factor."""
+    least, most = r.variable(inf), r.variable(0.0)
+    with r.count(r.choose(number > count + 1, count + 1, number, INTEGER), 1) as k:
+        ratio = spans[k - 1] / spans[k]
+        least.now, most.now = r.least(ratio, least.now), r.most(ratio, most.now)
+    return (number >= min(count + 1, SPANS[0])) & (most.now <= least.now * IN_TURN)
 
 
 def _mark_series(r: Routine, m: Sets, t: Value) -> None:
@@ -111,18 +165,22 @@ def _mark_series(r: Routine, m: Sets, t: Value) -> None:
         series[k] = r.choose((m.unit("slip")[k] == 0.0) & is_in, 1.0, 0.0)
 
 
-def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple[Value, Value, Value]) -> None:
+def _end_series(
+    r: Routine, m: Sets, intervals: tuple[Value, Value, Value], closing: tuple[Value, Value, Value]
+) -> None:
     """Stop what has a series of intervals, the last first, that ends soon.
 
     Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
     """
+    spans, number, in_turn = intervals
+    steady = r.choose(in_turn, IN_TURN, STEADY)
     cube, typical = spans[0] / spans[SPANS[0] - 1], r.variable(0.5)
     with r.count(60):  # the cube root: the mean factor of three intervals
         typical.now = typical.now - (typical.now - cube / (typical.now * typical.now)) * (1.0 / 3.0)
     even, long = r.variable(1, INTEGER), r.variable(1, INTEGER)
     with r.count(number, 1) as k:
         factor = spans[k - 1] / spans[k] / typical.now
-        is_even, is_steady = ((factor <= by) & (factor * by >= 1.0) for by in (EVEN, STEADY))
+        is_even, is_steady = ((factor <= by) & (factor * by >= 1.0) for by in (EVEN, steady))
         is_near = (even.now == k) & (k < SPANS[1])
         even.now = r.choose(is_near & is_even, k + 1, even.now)
         long.now = r.choose((long.now == k) & is_steady, k + 1, long.now)
@@ -149,7 +207,7 @@ def _end_series(r: Routine, m: Sets, spans: Value, number: Value, closing: tuple
     is_blurred = spans[0] * speed * lost < blur.now * BLURRED
     is_level = (share.now > LEVEL) & (spans[0] < m.later * SHORT) & ~is_squeezed | is_blurred
     left = r.choose(is_level, spans[0], rest)
-    flattens = 1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)
+    flattens = (1.0 - spans[0] / spans[1] < FLATTENS * (1.0 - share.now)) & ~in_turn
     is_steady = long.now >= r.choose(even.now < RECENT + 1, even.now, RECENT + 1, INTEGER)
     longest = r.choose(is_steady, r.choose(flattens, m.rough, m.ahead), m.later)
     is_closed = (rest < inf) & (spans[0] * speed < m.unit("small")[closing[1]] * SQUEEZED)

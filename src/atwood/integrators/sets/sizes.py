@@ -37,3 +37,6 @@ GAIN = 1e-9
 
 SHARED = 100.0
 """Times the slack of one inequality: shares that nothing determines come from other equations."""
+
+APART = 32.0
+"""Times rounding of a gap: one that is more comes to touch later than those that do now."""

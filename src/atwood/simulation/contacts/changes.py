@@ -18,10 +18,12 @@ from atwood.expr import evaluate
 from atwood.forms.assembly import Assembly
 from atwood.integrators.sets.record import REFUSED, UNDETERMINED
 from atwood.integrators.sets.series import (
+    ACCUMULATE,
     ALIKE,
     BEND,
     EVEN,
     FLATTENS,
+    IN_TURN,
     LATER,
     LEVEL,
     LONG,
@@ -36,6 +38,7 @@ from atwood.integrators.sets.series import (
 )
 from atwood.integrators.sets.shares import MOST_SHARES
 from atwood.integrators.sets.sizes import (
+    APART,
     ASTRAY,
     BEGINS,
     BLURRED,
@@ -149,6 +152,7 @@ class _Moment:
         self.events: list[EventRecord] = []
         self.resting: list[int] | None = None
         self._series: list[int] = []
+        self._in_turn = False
 
     def trigger(self, k: int) -> str:
         """Return the target of the event of a unit; empty where it has none now."""
@@ -216,7 +220,7 @@ class _Moment:
     def collide(self, one_by_one: bool) -> None:
         """Let what approaches collide, until nothing does."""
         for _ in range(_MOST_IMPACTS):
-            rates, touching = self.rates(), self.touching
+            rates, touching = self.rates(), self._at_once()
             speeds = {k: self.rate(k, rates) for k in touching}
             coming = [k for k in touching if speeds[k] < -self.slow[k]]
             if not coming:
@@ -231,6 +235,17 @@ class _Moment:
             where=self.first[0].row.key[0],
             advice="With impacts='together' they are solved at once.",
         )
+
+    def _at_once(self) -> list[int]:
+        """Return the gaps that collide at once; where impacts accumulate in turn only those that are at zero."""
+        touching, values = self.touching, self.values.values
+        if not self._in_turn:
+            return touching
+        return [
+            k
+            for k in touching
+            if self.before[k][0] == STICKS or self.trigger(k) or values[self.units[k][0]] <= APART * self.rounding[k]
+        ]
 
     def left_of(self, impacts: Sequence[tuple[float, str]], longest: tuple[float, float, float]) -> float | None:
         """Return in how long impacts that follow each other ever faster have come to an end; None if they do not.
@@ -247,21 +262,19 @@ class _Moment:
         response = np.abs(self.values.response[self.units[closing[0]][0]])
         moved = response > 1e-12 * float(np.max(response))
         parts = {one.row.key[0] for one, is_moved in zip(self.contacts, moved, strict=True) if is_moved}
-        spans, last, end = list[float](), self.t, None  # the last first
-        for time, part in reversed(impacts):
-            if part not in parts or time == end:
-                continue
-            end = time
-            if len(spans) == LONG or (spans and last - time <= LEVEL * spans[-1]):
-                break
-            spans.append(last - time)
-            last = time
+        spans, in_turn, lasts = self._intervals(impacts, parts, self.first[closing[0]].row.key[0])
+        speed, newest = abs(float(self.values.rates[self.units[closing[0]][0]])), 0.5 * sum(spans[:2])
+        self._in_turn = in_turn and lasts[0] < ACCUMULATE * lasts[1]
+        if in_turn and not _is_alike(spans, RECENT):  # two gaps in turn, each after an interval of its own
+            spans = [a + b for a, b in zip(spans[::2], spans[1::2], strict=False)]
+        if self._in_turn and not _is_alike(spans, RECENT // 2):
+            return self._end_of_swings(closing, impacts, newest * speed, lasts)
         if len(spans) < SPANS[0] or spans[0] <= 0.0:
             return None
         # Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
         ratios = np.array([after / before for after, before in pairwise(spans)])
         typical = float(np.exp(np.mean(np.log(ratios[: SPANS[0] - 1]))))
-        long = _first(np.abs(np.log(ratios / typical)) > math.log(STEADY))
+        long = _first(np.abs(np.log(ratios / typical)) > math.log(IN_TURN if in_turn else STEADY))
         count = _first(np.abs(np.log(ratios[: SPANS[1] - 1] / typical)) > math.log(EVEN))
         if count < SPANS[0] - 1:
             return None
@@ -281,16 +294,68 @@ class _Moment:
             # Rounding makes each bounce from the one before.
             if is_blurred or (share > LEVEL and spans[0] < SHORT * longest[2]):
                 left, most = spans[0], spans[0] * (1 if is_elastic else max(2.0 / (lost or 1.0), LONG))
-            flattens = 1.0 - ratios[0] < FLATTENS * (1.0 - share)
+            flattens = not in_turn and 1.0 - ratios[0] < FLATTENS * (1.0 - share)
             stays = share * speed <= self.slow[closing[0]] and math.isfinite(left)  # it would rest untold
             most_left = (longest[1] if flattens else longest[0]) if long >= min(count, RECENT) else longest[2]
             is_over = stays or is_blurred or left < most_left
         if not is_over or (is_elastic and (share <= LEVEL or spans[0] > LOSSLESS * longest[2])):
             return None
-        self._series = self._accumulating(closing, impacts, self.t - lasted)
-        self.small, self.slow = (self._blurred(one, NEAR_REST) for one in (self.small, self.slow))
+        self._end_series(closing, impacts, lasted)
         found = sum_of_series(np.array(spans[: long + 1]))
         return found if 0.0 <= found <= most else left
+
+    def _end_of_swings(
+        self, closing: list[int], impacts: Sequence[tuple[float, str]], height: float, lasts: tuple[float, float]
+    ) -> float | None:
+        """Return in how long impacts of gaps in turn come to an end whose intervals swing; None as long as gaps open.
+
+        Parameters
+        ----------
+        closing, impacts
+            The gaps that close now, and times and parts of the impacts before.
+        height
+            How far the gap has opened since the last impact, about.
+        lasts
+            How long the last impacts took, and as many before.
+        """
+        late, early = lasts
+        highest = late / RECENT * abs(float(self.values.rates[self.units[closing[0]][0]]))
+        if min(height, highest / SQUEEZED) > self.small[closing[0]]:
+            return None
+        self._end_series(closing, impacts, late + early)
+        return late * late / (early - late)
+
+    def _end_series(self, closing: list[int], impacts: Sequence[tuple[float, str]], lasted: float) -> None:
+        """Find which gaps have impacts that accumulate, and take them for closed where they nearly are."""
+        self._series = self._accumulating(closing, impacts, self.t - lasted)
+        self.small, self.slow = (self._blurred(one, NEAR_REST) for one in (self.small, self.slow))
+
+    def _intervals(
+        self, impacts: Sequence[tuple[float, str]], parts: Collection[str], part: str
+    ) -> tuple[list[float], bool, tuple[float, float]]:
+        """Return the intervals between impacts of some parts as long as they shrink, the last first.
+
+        Also whether one of the last was of another part than a given one, which does not rest, and how long the last
+        of them took, and as many before.
+        """
+        spans, last, end, count, in_turn, shrinks = list[float](), self.t, None, 0, False, True
+        rest = {one.row.key[0] for k, one in enumerate(self.first) if not one.is_slip and self.before[k][0] == STICKS}
+        own, since = {time for time, one in impacts if one == part or one in rest}, [0.0, 0.0]
+        for time, one in reversed(impacts):
+            if one not in parts or time == end:
+                continue
+            end, count = time, count + 1
+            in_turn = in_turn or (count < SPANS[0] and time not in own)
+            span, newer = last - time, spans[-2:] if in_turn else spans[-1:]
+            shrinks = shrinks and len(spans) < LONG and not (newer and span <= LEVEL * min(newer))
+            if shrinks:
+                spans.append(span)
+            if count in (RECENT, 2 * RECENT):
+                since[count // RECENT - 1] = self.t - time
+            if not shrinks and count >= 2 * RECENT:
+                break
+            last = time
+        return spans, in_turn, (since[0], since[1] - since[0])
 
     def _rounding(self, k: int, far: float = 0.0) -> float:
         """Return by how much rounding of the coordinates moves a gap, with places counted from as far away."""
@@ -781,6 +846,12 @@ class _Moment:
 def check_start(assembly: Assembly, state: tuple[float, FloatArray, FloatArray], length: float, scales: Scales) -> None:
     """Refuse a start inside of something; arguments as of `resolve`."""
     _Moment(ContactValues(assembly, *state, length), scales, 0.1 * tolerances.CLOSED, ()).check_start()
+
+
+def _is_alike(spans: Sequence[float], count: int) -> bool:
+    """Return whether so many of the last intervals are shorter than those before by one factor."""
+    ratios = [after / before for after, before in pairwise(spans[: count + 1])]
+    return len(ratios) >= min(count, SPANS[0] - 1) and max(ratios) <= IN_TURN * min(ratios)
 
 
 def _first(is_one: BoolArray) -> int:

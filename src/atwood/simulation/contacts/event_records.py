@@ -19,6 +19,9 @@ _RESTS = "impacts have accumulated: it rests"
 _LOOKED_AT, _FEW = 10, 4
 """So many impacts before a rest say how intervals go on to shrink, and no fewer."""
 
+_SWINGS = 0.02
+"""Where others have impacts in between, factors that change by more than this swing: what is left is a guess."""
+
 _LARGER = 3.0
 """Times how far a series seems to be off: it may be off by so much."""
 
@@ -33,7 +36,8 @@ def with_doubts(events: Sequence[EventRecord], least: float) -> tuple[EventRecor
 
     What is left of a series whose intervals shrink by r is the last one times ``r/(1 - r)``, and takes about
     ``1/(1 - r)`` intervals. If r changes by d in each, a share of about ``d/(1 - r)^2`` of it is in doubt, as where
-    what bounces is squeezed by what is nearly too heavy to come to rest.
+    what bounces is squeezed by what is nearly too heavy to come to rest. Where others have impacts in between it is no
+    rounding that lets them rise and fall.
     """
     found = list(events)
     for number, one in enumerate(events):
@@ -41,27 +45,35 @@ def with_doubts(events: Sequence[EventRecord], least: float) -> tuple[EventRecor
             continue
         times = [x.time for x in events[:number] if x.kind == "impact" and (x.part, x.law) == (one.part, one.law)]
         doubt = 0.0 if len(times) <= _FEW else one.time - times[-1]
+        in_turn = any(
+            x.kind == "impact" and x.part != one.part and times[-2] < x.time < times[-1]
+            for x in events[:number]
+            if doubt
+        )
         for count in range(len(times), _FEW, -1):
-            may_be_off, is_rounding = _doubt(times[max(0, count - _LOOKED_AT) : count], one.time)
+            may_be_off, is_rounding = _doubt(times[max(0, count - _LOOKED_AT) : count], one.time, in_turn)
             doubt = min(doubt, may_be_off)
-            if not is_rounding:
+            if in_turn or not is_rounding:
                 break
         if doubt > least:
             found[number] = replace(one, message=f"{one.message}, at a time that may be off by {doubt:.1g} s")
     return tuple(found)
 
 
-def _doubt(times: Sequence[float], end: float) -> tuple[float, bool]:
+def _doubt(times: Sequence[float], end: float, swings: bool) -> tuple[float, bool]:
     """Return by how much the end of a series may be off, as some impacts say, s, and whether rounding tells in these.
 
-    Factors that rise and fall are rounding, and those before say more.
+    Factors that rise and fall are rounding, and those before say more; of those that swing by themselves all count.
     """
     spans, left = np.diff(times), end - times[-1]
     if not np.all(spans > 0.0) or spans[-1] == spans[-2]:
         return left, True
     shares = spans[1:] / spans[:-1]
     changes = np.diff(shares)
-    doubt = left * min(1.0, _LARGER * abs(float(np.median(changes))) / (1.0 - float(shares[-1])) ** 2)
+    change = float(np.max(np.abs(changes)) if swings else abs(np.median(changes)))
+    doubt = left * min(1.0, _LARGER * change / (1.0 - float(shares[-1])) ** 2)
+    if swings and change > _SWINGS:
+        doubt = _LARGER * left
     return doubt, bool(np.any(changes > 0.0) and np.any(changes < 0.0))
 
 
