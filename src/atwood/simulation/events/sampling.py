@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from atwood.arrays import FloatArray
+from atwood.arrays import FloatArray, IntArray
 from atwood.codegen import BoundKernel
 from atwood.errors import AtwoodError, DeclarationError, ParameterError, SolveError, UsageError
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, depends_on
@@ -114,13 +114,19 @@ class Sampler:
         number = int(self.times.searchsorted(t, side="left"))
         return self.due[number] if number < len(self.times) and self.times[number] == t else ()
 
-    def due_at_each(self, times: FloatArray) -> list[tuple[int, ...]]:
-        """Return which updates are due at each of some times."""
-        return [self._due.get(t, ()) for t in times.tolist()]
+    def due_at_each(self, times: FloatArray) -> tuple[list[tuple[int, ...]], IntArray]:
+        """Return which updates are due together at some times, and the number of that for each; a run again has it."""
+        about = times.tobytes()
+        if about not in self._known:
+            due, ways = dict(zip(self.times.tolist(), self.due, strict=True)), dict[tuple[int, ...], int]()
+            number = np.array([ways.setdefault(due.get(t, ()), len(ways)) for t in times.tolist()])
+            self._known.clear()
+            self._known[about] = list(ways), number
+        return self._known[about]
 
     @cached_property
-    def _due(self) -> dict[float, tuple[int, ...]]:
-        return dict(zip(self.times.tolist(), self.due, strict=True))
+    def _known(self) -> dict[bytes, tuple[list[tuple[int, ...]], IntArray]]:
+        return {}
 
     @property
     def is_pure(self) -> bool:

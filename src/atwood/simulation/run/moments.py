@@ -83,13 +83,9 @@ def times_ahead(plan: SceneProblem, schedule: Schedule, sampler: Sampler, t: flo
     """Return a time, and the moments after it that steps can pass by themselves: none if they cannot."""
     assembly, end = plan.assembly, options.t_end
     own = assembly.own_equations
-    moments = [
-        one[slice(*one.searchsorted([t, end], side="right"))] for one in (schedule.times, sampler.times) if len(one)
-    ]
-    if not any(map(len, moments)):
-        return np.array([t])
-    times = np.unique(np.concatenate([[t], *moments]))
-    times = times[times < end]
+    times, are_apart = _merged(t, end, schedule.times.tobytes(), sampler.times.tobytes())
+    if len(times) == 1:
+        return times
     is_plain = not (
         plan.finding.redundant
         or plan.dependent_speeds
@@ -102,8 +98,18 @@ def times_ahead(plan: SceneProblem, schedule: Schedule, sampler: Sampler, t: flo
         or options.conditions
         or any(one.law.options.at for one in sampler.updates)
     )
+    return times if is_plain and are_apart else times[:1]
+
+
+@lru_cache(maxsize=4)
+def _merged(t: float, end: float, *given: bytes) -> tuple[FloatArray, bool]:
+    """Return a time and those of some moments that come behind it, before an end, and whether steps fit between."""
+    moments = [one[one > t] for one in map(np.frombuffer, given)]
+    times = np.unique(np.concatenate([[t], *moments]))
+    times = times[times < end]
+    times.flags.writeable = False
     gaps = np.diff(np.concatenate([times, [end]]))
-    return times if is_plain and np.all(gaps > MOMENT * np.spacing(np.abs(times) + end)) else np.array([t])
+    return times, bool(np.all(gaps > MOMENT * np.spacing(np.abs(times) + end)))
 
 
 def change_on_the_way(session: Session, ahead: Ahead, plan: SceneProblem) -> bool:
@@ -126,8 +132,8 @@ def pass_moments(
 ) -> Passed | None:
     """Go through moments, and record what single stretches would; None where not even the first came out well."""
     way = _Way(ahead, recorder.plan)
-    given, changes = ahead.samples, tuple([bool(due) for due in way.due])
-    about = ahead.times.tobytes(), given.times.tobytes(), given.shown.tobytes(), changes, first_shown
+    given, changes = ahead.samples, way.each(lambda due: bool(due), bool)
+    about = ahead.times.tobytes(), given.times.tobytes(), given.shown.tobytes(), changes.tobytes(), first_shown
     samples, shown, first = _rows(*about, bool(ahead.sampler.due_at(float(given.times[-1]))))
     moments = session.through(way.changes(filling, samples, first))
     if moments is None:
@@ -155,7 +161,7 @@ def pass_moments(
 
 @lru_cache(maxsize=4)
 def _rows(
-    moments_: bytes, times_: bytes, shown_: bytes, due: tuple[bool, ...], first_shown: bool, changes_at_end: bool
+    moments_: bytes, times_: bytes, shown_: bytes, due_: bytes, first_shown: bool, changes_at_end: bool
 ) -> tuple[FloatArray, BoolArray, IntArray]:
     """Return the samples of all stretches, each with both its ends, which are shown, and where each begins.
 
@@ -171,7 +177,7 @@ def _rows(
     shown = (given_times[place] == rows) & given_shown[place]
     begins = rows.searchsorted(moments, side="right") - 1  # behind the state before
     shown[begins[1:] - 1] = False
-    shown[begins[1:][np.array(due[1:], dtype=bool)]] = True
+    shown[begins[1:][np.frombuffer(due_, dtype=bool)[1:]]] = True
     shown[0] = first_shown
     if changes_at_end:  # the state just after it is shown
         shown[-1] = False
@@ -187,14 +193,18 @@ class _Way:
     def __init__(self, ahead: Ahead, plan: SceneProblem) -> None:
         self._ahead, self._plan = ahead, plan
         self._pieces = ahead.schedule.times.searchsorted(ahead.times, side="right")
-        self.due = ahead.sampler.due_at_each(ahead.times)
+        self._due, self._number = ahead.sampler.due_at_each(ahead.times)
         self.held = np.zeros((0, 0))
         self.error: Exception | None = None
+
+    def each(self, of: Callable[[tuple[int, ...]], int], kind: type = np.int64) -> IntArray:
+        """Return something of which updates are due, for each moment."""
+        return np.array([of(one) for one in self._due], dtype=kind)[self._number]
 
     def changes(self, filling: Filling, samples: FloatArray, first: IntArray) -> Changes:
         """Return what happens, for the session of some rates."""
         ahead, assembly, rates = self._ahead, self._plan.assembly, filling.own.rates
-        which = np.array([-1 if due else 0 for due in self.due], dtype=np.int64)
+        which = self.each(lambda due: -1 if due else 0)
         update: tuple[int, int] = 0, 0
         keep: object = None
         if np.count_nonzero(which) >= _MANY:
@@ -203,7 +213,7 @@ class _Way:
             found = update_code(assembly, ahead.sampler)
             if found is not None:
                 code, chains = found
-                which = np.array([chains.get(due, 0) for due in self.due], dtype=np.int64)
+                which = self.each(lambda due: chains.get(due, 0))
                 data, keep = code.bind(assembly)
                 update = code.address, data
         which[0] = 0  # what happens at the start has happened
@@ -241,7 +251,9 @@ class _Way:
         q, u = self._plan.program.split(state)
         there = self.assembly_at(tuple(parameters[held].tolist()), k)
         try:
-            made = self._ahead.update(self.due[k], there, float(self._ahead.times[k]), q.copy(), u.copy())
+            made = self._ahead.update(
+                self._due[self._number[k]], there, float(self._ahead.times[k]), q.copy(), u.copy()
+            )
         except Exception as error:  # it is raised where the stretches before are recorded
             self.error = error
             return False
