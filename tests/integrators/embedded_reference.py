@@ -101,16 +101,15 @@ class StepperInPython(Stepper):
     def interpolation(self) -> None:
         """Return that no compiled code reads its steps."""
 
-    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
+    def sample(self, times: FloatArray, steps: int, y: FloatArray, yp: FloatArray) -> tuple[int, Outcome]:
+        """Take steps, and write values and rates at as many times, one row each, as are reached; return these."""
         last = self.counts.steps + steps
-        y, yp = np.empty((2, len(times), len(self.state()[1])))
         for filled, t in enumerate(times):
             outcome = self.run(float(t), last - self.counts.steps)
             if outcome is not Outcome.REACHED:
-                return y[:filled], yp[:filled], outcome
+                return filled, outcome
             _, y[filled], yp[filled] = self.interpolate(float(t))
-        return y, yp, Outcome.REACHED
+        return len(times), Outcome.REACHED
 
 
 class ReferenceStepper(StepperInPython):

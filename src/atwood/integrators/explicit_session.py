@@ -352,7 +352,7 @@ class ExplicitSession(SteppingSession):
         count = 0 if self._sees else int(times.searchsorted(last if self._root is None else self._root.state[0]))
         if count:
             try:
-                values[:count], rates[:count], _ = self._stepper.sample(times[:count], 0)
+                self._stepper.sample(times[:count], 0, values, rates)
             except KernelEvaluationError:  # they are read one by one as far as there are values
                 return 0
             self._here = float(times[count - 1]), values[count - 1].copy(), rates[count - 1].copy()
@@ -362,13 +362,11 @@ class ExplicitSession(SteppingSession):
         """Let the stepper fill tables for a moment; return how many times it reached."""
         looked = time.perf_counter()
         self._tell_signs()
-        y, yp, outcome = self._stepper.sample(times, self._allowed())
+        count, outcome = self._stepper.sample(times, self._allowed(), values, rates)
         self._learn(time.perf_counter() - looked, outcome)
-        count = len(y)
-        values[:count], rates[:count] = y, yp
         self._take_up(outcome)
         if count:
-            self._here = (float(times[count - 1]), y[-1].copy(), yp[-1].copy())
+            self._here = (float(times[count - 1]), values[count - 1].copy(), rates[count - 1].copy())
         self._pass_jumps()
         return count, outcome
 

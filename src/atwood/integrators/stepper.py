@@ -315,10 +315,12 @@ class Stepper:
             raise self._no_interpolation(t)
         return t, self._values[0].copy(), self._values[1].copy()
 
-    def sample(self, times: FloatArray, steps: int) -> tuple[FloatArray, FloatArray, Outcome]:
-        """Take steps, and return values and rates at as many of the times, one row each, as were reached."""
+    def sample(self, times: FloatArray, steps: int, y: FloatArray, yp: FloatArray) -> tuple[int, Outcome]:
+        """Take steps, and write values and rates at as many of the times, one row each, as are reached; return these.
+
+        The tables are in C order.
+        """
         times = np.ascontiguousarray(times, dtype=np.float64)
-        y, yp = np.empty((2, len(times), self._size))
         last, filled, code = self._count("steps") + min(steps, _UNLIMITED), 0, None
         while code is None:
             left, values, rates = address_of(times[filled:]), address_of(y[filled:]), address_of(yp[filled:])
@@ -326,7 +328,7 @@ class Stepper:
             filled += self._count("filled")
         if code == _NO_VALUE:
             raise self._no_interpolation(float(times[filled]))
-        return y[:filled], yp[:filled], _OUTCOMES[code]
+        return filled, _OUTCOMES[code]
 
     def interpolation(self) -> tuple[int, int] | None:
         """Return the addresses of the function that reads the last step, and of its session; None where there is none.
