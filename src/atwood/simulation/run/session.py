@@ -321,9 +321,13 @@ class KeptSession:
         """Whether steps are to make impacts, or changes of a set of contacts, by themselves."""
         if self.impacts is None or self.is_undisturbed or not assembly.own_equations.contacts:
             return False  # what is tried as without contacts ends at the first event, and is made anew
+        return self._are_many(assembly)
+
+    def _are_many(self, assembly: Assembly) -> bool:
+        """Return whether there are so many changes, or so few rows, that the routine of sets pays."""
         from atwood.simulation.contacts.compiled import FEW_ROWS  # few scenes have any
 
-        many = len(self.impacts) >= _MANY_IMPACTS or self.changes >= MANY_CHANGES
+        many = len(self.impacts or ()) >= _MANY_IMPACTS or self.changes >= MANY_CHANGES
         return many or len(assembly.own_equations.contacts) <= FEW_ROWS
 
     def filling_of(self, session: Session | None) -> Filling | None:
@@ -341,8 +345,11 @@ class KeptSession:
     ) -> SetSolver | None:
         """Return what finds sets for a plan: the changes of its session, or where steps make none, a routine alone.
 
-        None where there is none, and where nothing is opened for what begins: there is no method yet.
+        None where there is none, and where nothing is opened for what begins: there is no method yet. Sessions of runs
+        before change no set that the first run left to Python: a run that is made again is the same to the last digit.
         """
+        if not self._are_many(plan.assembly):
+            return None
         own = plan.assembly.shared, plan.program, plan.scales, plan.sizes, plan.finding
         for one in self.kept:
             jumps = one.fill.problem.jumps if isinstance(one.fill, Filling) else None
