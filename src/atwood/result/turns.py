@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.result.segment_quantities import quantities_of, values_along
 from atwood.simulation.run.recorder import SegmentRecord
-from atwood.simulation.run.run_record import Run, run_again
+from atwood.simulation.run.run_record import Run, places_among, run_again
 
 _CHANGE = 1.0
 """rad: rates may change so much times the distance of samples, or an angle is not continued by them."""
@@ -137,7 +137,7 @@ def _places(own: Sequence[SegmentRecord], finer: Sequence[SegmentRecord]) -> lis
     """Return where the samples of a run stand among those of the finer one."""
     found, before = list[int](), 0
     for one, other in zip(own, finer, strict=True):
-        found += (before + np.searchsorted(other.time, one.time)).tolist()
+        found += (before + places_among(one.time, other.time)).tolist()
         before += len(other.time)
     return found
 

@@ -62,7 +62,7 @@ def test_dominoes_fall_one_after_another(form: str) -> None:
 
 
 def test_the_ledger_of_what_rubs_follows_the_steps() -> None:
-    """A run made again let the routine change its first sets, and was no longer the same; samples had to do, to 3e-4."""
+    """A run made again let the routine change its first sets, and was another; samples had to do, unsure by 3e-4."""
     energies = [simulate(dominoes(4, 0.2), t_end=0.5, rtol=1e-10, outputs=count).energy for count in (3, 150)]
     for one in energies:
         assert one.max_drift < 1e-9

@@ -14,6 +14,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atwood.arrays import FloatArray
 from atwood.errors import AtwoodError, SolveError
@@ -265,6 +266,9 @@ def shortest_mode(plan: SceneProblem, options: RunOptions, began: float) -> floa
 _SAME = 1e-9
 """Of the scene's sizes: projections of many states at once round as their number has it, and the solver not at all."""
 
+_MOMENT = 1e-12
+"""Of the time: so much later or earlier is an event of IDA that is looked for between other samples."""
+
 _WHOLE = ("finished", "stopped", "failed")
 """How a run ends by itself; otherwise it is made again with as many steps as it came to."""
 
@@ -282,13 +286,19 @@ def run_again(run: Run, between: FloatArray) -> Run | None:
     if found is None or len(found.segments) != len(run.segments):
         return None
     for one, other in zip(run.segments, found.segments, strict=True):
-        places = np.minimum(np.searchsorted(other.time, one.time), len(other.time) - 1)
-        if not np.array_equal(other.time[places], one.time):
+        places = places_among(one.time, other.time)
+        if not np.all(np.abs(other.time[places] - one.time) <= _MOMENT * np.max(np.abs(one.time))):
             return None
         apart = np.abs(other.coordinates[:, places] - one.coordinates) / one.plan.coordinate_sizes[:, None]
         if not np.max(apart, initial=0.0) < _SAME:
             return None
     return found
+
+
+def places_among(time: FloatArray, more: FloatArray) -> NDArray[np.intp]:
+    """Return where the samples of a stretch stand among those of the same stretch with more."""
+    moment = _MOMENT * np.max(np.abs(time))
+    return np.asarray(np.minimum(np.searchsorted(more, time - moment), len(more) - 1))
 
 
 def _repeat(run: Run, between: FloatArray, on_step: Callable[[float], object] | None) -> Run | None:
