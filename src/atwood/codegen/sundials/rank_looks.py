@@ -358,7 +358,8 @@ def _is_clear(opened: Opened) -> Routine:
     given, least, largest = r.arguments
     data, state, shape = opened(given)
     end, limit = data["notes"][(least + 1) * shape.note], largest * CLEAR
-    with r.when(data["notes"][least * shape.note] == state.behind):
+    note = data["notes"].at(least * shape.note)
+    with r.when((note[0] == state.behind) & ~(note[shape.measured] > limit)):
         r.give(r.call("leaves", given, limit))
     for back in (0, 1):
         with r.when(least > back):
@@ -366,7 +367,7 @@ def _is_clear(opened: Opened) -> Routine:
             before, away = one[shape.measured], other[shape.measured]
             there = other[0] + (other[0] - one[0]) * away / (before - away)
             r.give_if((away < before) & (there <= end), 0)
-    r.give_if(~(data["notes"][least * shape.note + shape.measured] > limit), 0)
+    r.give_if(~(note[shape.measured] > limit), 0)
     for back in (0, 1):
         with r.when(least >= back):
             r.give_if(~(r.call("between", given, least - back, result=NUMBER) > limit), 0)
