@@ -102,7 +102,7 @@ def test_a_wedge_locks_itself_until_it_is_pushed_out_or_in(form: str, angle: flo
     ("seed", "form"),
     [
         *((787000159, "reduced"), (787000161, "dae"), (787000398, "reduced"), (787000491, "dae")),
-        *((787000190, "dae"), (787000227, "reduced")),
+        *((787000190, "dae"), (787000227, "reduced"), (791000103, "reduced")),
     ],
 )
 def test_c_finds_sets_and_shares_that_contradict_nothing(seed: int, form: str, tmp_path: Path) -> None:

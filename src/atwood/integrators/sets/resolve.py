@@ -13,7 +13,6 @@ from atwood.integrators.sets.finding import FINDING
 from atwood.integrators.sets.impacts import IMPACTS
 from atwood.integrators.sets.record import (
     INSIDE,
-    NO_SET,
     NO_VALUE,
     OPENS,
     STOPS,
@@ -170,8 +169,8 @@ def _settle() -> Routine:
         trigger = m.unit("trigger")[k]
         rests.now = rests.now & (trigger != float(OPENS)) & (trigger != float(YIELDS))
     with r.when(some.now):
-        r.give_if(r.call("find_states", r.arguments[0]) != 0, NO_SET)
-        do_or_return(r, "share_forces", rests.now.integer())
+        misses = r.call("find_states", r.arguments[0])
+        do_or_return(r, "share_forces", rests.now.integer(), misses)
     with r.when(repeated.now):
         _look_at_begins(r, m)
     with r.count(m.count) as k:

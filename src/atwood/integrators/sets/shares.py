@@ -12,6 +12,7 @@ from math import inf, sqrt
 from atwood.codegen.routines import ADDRESS, BOOLEAN, INTEGER, NUMBER, Routine, Value, Variable
 from atwood.integrators.event_routines import do_or_return
 from atwood.integrators.sets.record import (
+    NO_SET,
     UNDETERMINED,
     Sets,
     copy_states,
@@ -131,15 +132,18 @@ def _is_shared_by_parts(r: Routine, m: Sets, way: Value) -> Value:
 
 
 def _share() -> Routine:
-    """Let all rest, or let go what need not hold, where nothing determines forces; see `find_states` and `_shared`."""
-    r, m, (rests,) = open_routine("share_forces", {"rests": INTEGER})
+    """Let all rest, or let go what need not hold, where nothing determines forces; see `find_states` and `_shared`.
+
+    Where `misses` says that no set was found, rest may be one all the same.
+    """
+    r, m, (rests, misses) = open_routine("share_forces", {"rests": INTEGER, "misses": INTEGER})
     place, state, repeats = r.arguments[0], m.unit("next"), r.variable(m.repeats, INTEGER)
     small = small_motion(r, m)
     goes, moves = r.variable(False, BOOLEAN), r.variable(False, BOOLEAN)
     with each_unit(r, m, "chosen") as (k, row, is_pair), r.when(m.unit("given")[k] == 0.0):
         is_moved = size_of_slip(r, row, is_pair, m.row("motions"))[2] > small
         goes.now, moves.now = goes.now | (state[k] != float(STICKS)), moves.now | is_moved
-    tries = r.variable(goes.now & (rests != 0), BOOLEAN)
+    tries = r.variable((goes.now & (rests != 0)) | (misses != 0), BOOLEAN)
     r.give_if(~tries.now & (repeats.now == 0), 0)
     copy_states(r, m, "found", "next")
     with r.when(tries.now):
@@ -150,6 +154,7 @@ def _share() -> Routine:
         with r.when(tries.now), r.when(r.call("determined", place) == 0):
             m.shared = 1
             r.give_if(r.call("let_go", place) == 0, 0)
+        r.give_if(misses != 0, NO_SET)
         copy_states(r, m, "next", "found")
         r.call("meet_states", place)
     r.give_if(repeats.now == 0, 0)
