@@ -18,10 +18,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, solve, substitute
-from atwood.forms.caches import derive_once
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.forms.residuals import keep_constraints
-from atwood.lazy_dataclasses import dataclass, names_of
+from atwood.lazy_dataclasses import dataclass
 from atwood.mechanics.dynamics.augmented import Step, SymmetricSystem, eliminate, fill_of, solution_of, with_right
 from atwood.mechanics.dynamics.equations import Constraint, ContactRow, Equations
 
@@ -33,9 +32,6 @@ _FILL_OF_CONTACTS = 500
 
 _ADDED = 1e-9
 """Of the diagonal of gaps and slips, which may repeat each other: what they miss shrinks by that in a step."""
-
-_NOT_READ = ("locals_", "site", "masses", "shapes", "decisions", "constants")
-"""What equations were made of; their derivation reads what was made."""
 
 Place = tuple[int, int]
 _Slopes = dict[int, Expression]
@@ -73,12 +69,9 @@ def constrained_program(
     graph = equations.graph
     sizes = tuple(graph.symbol(f"size of {one.name}") for one in equations.speed_names)
     held = keep_constraints(equations, kept)
-    read = [getattr(held, one) for one in names_of(Equations) if one not in _NOT_READ]
-
-    def derive() -> tuple[str, list[Expression]]:
-        return "augmented", [*_accelerations(held, rows, sizes, light), *_projection(held, sizes)]
-
-    _, found = derive_once("constrained", graph, (read, tuple(rows), parameters, sizes, tuple(light)), derive)
+    start = len(graph)
+    found = [*_accelerations(held, rows, sizes, light), *_projection(held, sizes)]  # to keep it would cost what it does
+    graph.forget(start)
     n, m = len(equations.coordinates), len(equations.speeds)
     groups, known = state_groups(equations), (*parameters, *sizes)
     outputs: tuple[OutputGroup, ...] = (OutputGroup("accelerations", tuple(found[:m])),)
