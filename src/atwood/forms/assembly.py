@@ -165,6 +165,11 @@ class Assembly:
         forest = grow_spanning_forest(
             form, mechanism.graph, mechanism.bodies, mechanism.locals_, mechanism.space, orientation
         )
+        hangs = any(one.joint is not None for one in forest.attachments)
+        if form == "reduced" and not hangs and not any(one.constraints for one in mechanism.locals_.values()):
+            maximal = self.maximal  # where nothing is held either, these are the same coordinates
+            if replace(maximal.forest, form=form) == forest and not maximal.constraints:
+                return replace(maximal, forest=forest)
         with mechanism.relations.reading():
             made = build_equations(mechanism, forest)
         mechanism.table.graph.forget(start)
