@@ -1,9 +1,10 @@
 """What each stage takes of 10, 100, 1,000 and 10,000 bodies: a chain, a tree, a net, ragdolls, a row of four-bars.
 
 Each case is a process of its own with an empty cache: it makes the scene, assembles it, makes a short run, the same
-again, and one to another end. Then runs of some steps and of three times that time, in machine code, tell what a step
-takes: their difference, the best of five each. Times are of the processor, memory is the most that the process has had
-so far, less what it had before. A case that takes longer than `LONGEST` is not shown. BLAS has one thread.
+again, and one to another end. Machine code of its accelerations is written once more, outside the cache: what LLVM takes
+of that, and what writing the text does. Then runs of some steps and of three times that time, in machine code, tell what
+a step takes: their difference, the best of five each. Times are of the processor, memory is the most that the process has
+had so far, less what it had before. A case that takes longer than `LONGEST` is not shown. BLAS has one thread.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ LONGEST = 600.0
 
 COUNTS = (10, 100, 1000, 10_000)
 STAGES = ("scene", "assemble", "first run", "again", "another end")
+CODE = ("text of code, s", "LLVM, s", "lines of text")
 SPAN = 1e-3
 STEPS = 100
 """In that time a run of which steps are measured takes at least so many."""
@@ -119,8 +121,32 @@ def one_case(name: str, count: int, report: Path) -> None:
 
     for stage, end in (("first run", SPAN), ("again", SPAN), ("another end", 1.1 * SPAN)):
         timed(stage, lambda end=end: run(end))
+    timed("text", lambda: found.update(_of_code(assembly)))
+    found["text"] -= found["LLVM"]
     found["ns, step and body"] = 1e9 * _of_a_step(run) / count
     report.write_text(json.dumps(found), encoding="utf-8")
+
+
+def _of_code(assembly: Any) -> dict[str, float]:
+    """Write machine code of the accelerations; return the seconds that LLVM takes, and how long its text and code are."""
+    from atwood.codegen.llvm import build
+    from atwood.forms.accelerations import accelerations_of
+
+    made, compiling, found = accelerations_of(assembly), build.compile_text, {"LLVM": 0.0}
+    if made is None:  # constraints stay
+        return found
+
+    def timed(text: str, *given: Any, **named: Any) -> bytes:
+        began = time.process_time()
+        code = compiling(text, *given, **named)
+        found.update({"LLVM": time.process_time() - began, "lines": float(text.count("\n")), "bytes": float(len(code))})
+        return code
+
+    build.compile_text = timed
+    parts = [build.Part("kernel", made.program)]
+    build.build_code(parts, build.default_options(parts), cached=False)
+    build.compile_text = compiling
+    return found
 
 
 def _of_a_step(run: Callable[..., Any]) -> float:
@@ -170,8 +196,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if made is None:
                 break
             cells = [f"{made[one]:.2g} s, {made[f'{one}, MB']:.0f} MB" for one in STAGES]
-            rows.append([f"{count:,}", *cells, made["ns, step and body"]])
-        print_table(name, ["bodies", *STAGES, "ns, step and body"], rows)
+            code = [made["text"], made["LLVM"], made.get("lines")]
+            rows.append([f"{count:,}", *cells, *code, made["ns, step and body"]])
+        print_table(name, ["bodies", *STAGES, *CODE, "ns, step and body"], rows)
     save(chosen.json, results)
     if chosen.plot:
         draw_growth(chosen.plot, results, STAGES)

@@ -31,7 +31,6 @@ from atwood.codegen.llvm.linear_systems import write_elimination
 from atwood.codegen.llvm.text import OWN_FUNCTIONS
 from atwood.codegen.routines import ADDRESS, CODE, INTEGER, NUMBER, Routine, Value, Variable
 from atwood.errors import UnsupportedError
-from atwood.expr.core.analysis import live
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
 from atwood.lazy_dataclasses import dataclass
@@ -82,7 +81,7 @@ def tapes_of(program: Program, functions: Callable[[str], int], positions: Seque
     """
     known = _KNOWN.get(program)
     if known is None or positions is not None:
-        once = _Writer(prologue_body(program), functions).tape(live(program.prologue))
+        once = _Writer(prologue_body(program), functions).tape(program.once)
         known = [_Writer(main_body(program, positions), functions).tape(program.nodes), once]
         if positions is None:
             _KNOWN[program] = known

@@ -112,7 +112,7 @@ class CompiledProgram:
         if self._is_compiled("_prologue"):
             return list(self._prologue(parameters)[0])
         values = {one.index: value for one, value in zip(program.parameters, parameters, strict=True)}
-        walk(self._before, values, _OPERATIONS["vectorized" if self.vectorized else "careful"])
+        walk(self.program.once, values, _OPERATIONS["vectorized" if self.vectorized else "careful"])
         return [values[one.index] for one in program.prologue]
 
     def _is_compiled(self, name: str) -> bool:
@@ -127,11 +127,6 @@ class CompiledProgram:
         """Return what counts how often functions are walked through before they are compiled."""
         count = WALKS if self.program.size < LONG else LONG_WALKS
         return {"main": iter(range(count)), "_prologue": iter(range(count))}
-
-    @cached_property
-    def _before(self) -> list[Expression]:
-        """What is computed once a run, arguments before users."""
-        return live(self.program.prologue)
 
     @cached_property
     def _between(self) -> list[Expression]:
@@ -156,7 +151,7 @@ class CompiledProgram:
     def _prologue(self) -> Callable[..., tuple[list[Any], ...]]:
         flavour: Flavour = "vectorized" if self.vectorized else "careful"
         program = self.program
-        source, externals = write_function("prologue", flavour, [program.parameters], self._before, [program.prologue])
+        source, externals = write_function("prologue", flavour, [program.parameters], program.once, [program.prologue])
         return _execute("prologue", source, externals, flavour, program.name)
 
 

@@ -122,19 +122,15 @@ def _to_look_up(expressions: Iterable[Expression]) -> Collection[Expression]:
     return expressions if isinstance(expressions, set | frozenset | dict) else set(expressions)
 
 
-def varying(nodes: Sequence[Expression], parameters: Iterable[Expression]) -> set[int]:
-    """Return the indices of the nodes that need something besides constants and parameters."""
+def varying(nodes: Sequence[Expression], parameters: Iterable[Expression]) -> set[Expression]:
+    """Return the nodes that need something besides constants and parameters."""
     fixed = _to_look_up(parameters)
-    result: set[int] = set()
+    result: set[Expression] = set()
+    add, are_fixed = result.add, result.isdisjoint
     for node in nodes:
-        if node.operation == "symbol":
-            if node not in fixed:
-                result.add(node.index)
-        elif node not in fixed:
-            for argument in node.arguments:
-                if argument.index in result:
-                    result.add(node.index)
-                    break
+        arguments = node.arguments
+        if (not are_fixed(arguments) if arguments else node.operation == "symbol") and node not in fixed:
+            add(node)
     return result
 
 
@@ -160,7 +156,7 @@ def count_operations(outputs: Sequence[Expression | float], parameters: Collecti
 def count_nodes(nodes: Sequence[Expression], parameters: Collection[Expression] = ()) -> dict[str, int]:
     """Return the same for all nodes that outputs need, arguments before users."""
     needed = varying(nodes, parameters)
-    counts = Counter(node.operation for node in nodes if node.index in needed and node.operation not in UNCOUNTED)
+    counts = Counter(node.operation for node in nodes if node in needed and node.operation not in UNCOUNTED)
     return dict(sorted(counts.items()))
 
 

@@ -527,7 +527,7 @@ def affine_coefficients(
     for column, entry in zip(derivative.columns, derivative.entries, strict=True):
         coefficients[column] = entry
     slopes = live(coefficients)
-    if varying(slopes, parameters) & {coefficient.index for coefficient in coefficients}:
+    if not varying(slopes, parameters).isdisjoint(coefficients):
         return None
     [remainder] = substitute([expression], dict.fromkeys(variables, 0.0))
     return coefficients, remainder

@@ -123,10 +123,20 @@ class Program:
 
         These are the values that the rest of the program, or an output, uses directly.
         """
-        needed = varying(self.nodes, self.parameters)
-        used = set(self.results).union(*[node.arguments for node in self.nodes if node.index in needed])
-        once = [node for node in self.nodes if node.index not in needed and node.operation != "constant"]
-        return tuple(node for node in once if node in used)
+        used = set(self.results).union(*[node.arguments for node in self._moving])
+        return tuple([node for node in self.once if node.operation != "constant" and node in used])
+
+    @cached_property
+    def once(self) -> tuple[Expression, ...]:
+        """Every node that the prologue needs, itself included, arguments before users."""
+        moving = self._moving
+        known = [node for node in self.nodes if node not in moving]
+        used = set[Expression]().union(*[node.arguments for node in known])
+        return tuple([node for node in known if node.operation != "constant" or node in used])
+
+    @cached_property
+    def _moving(self) -> set[Expression]:
+        return varying(self.nodes, self.parameters)
 
     @cached_property
     def operations(self) -> dict[str, int]:

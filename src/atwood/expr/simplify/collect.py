@@ -138,7 +138,7 @@ def _weights_of(
         own = users[node.index]
         for argument in node.arguments:
             users[argument.index] |= own
-        if node.index in needed and node.operation not in UNCOUNTED:
+        if node in needed and node.operation not in UNCOUNTED:
             weights.append(_WEIGHTS.get(node.operation, _OTHER_WEIGHT))
             found.append(own.to_bytes(size, "little"))
     bits = np.frombuffer(b"".join(found), dtype=np.uint8).reshape(len(found), size)

@@ -202,7 +202,7 @@ def expand(
     """Write expressions as polynomials."""
     expansion = Expansion(tuple(angles), effort=effort or Effort(1_000_000))
     nodes = live(rows)
-    moving = varying(nodes, parameters) | {angle.index for angle in angles}
+    moving = {node.index for node in varying(nodes, parameters).union(angles)}
     wanted = _wanted(rows, nodes, moving, expansion.angles)
     known: dict[int, Polynomial] = {}
     for node in nodes:

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 _EVENT_FUNCTIONS: Key[tuple[EventFunction, ...]] = Key("event functions")
 _NEEDS: Key[_Needs] = Key("what event functions read")
 _EVENTS: Key[Program] = Key("events")
+_EVENT_PROGRAM: Key[Program | None] = Key("events and their shifts")
 _EVENT_CODE: Key[EventCode | None] = Key("machine code of events")
 _REACTIONS: Key[ReactionSolver] = Key("reactions that events read")
 _AT_START: Key[dict[str, Any]] = Key("what events know at the start of a mode")
@@ -297,9 +298,11 @@ class EventProbe:
         state = t, q.tobytes(), u.tobytes()
         if self.needs.reactions:
             self.reactions = assembly.kept.get(_REACTIONS, lambda: ReactionSolver(assembly, t, q, u), *state)
-        self.kernel = assembly.kernel(
-            known_program(assembly, _EVENTS, lambda: [one.value for one in self.event_functions], self._about)
-        )
+        program = self.program() if self.needs == _NOTHING else None
+        if program is None:
+            watched = [one.value for one in self.event_functions]
+            program = known_program(assembly, _EVENTS, lambda: watched, self._about)
+        self.kernel = assembly.kernel(program)
         sizes = [plan.scales.of_law(one.part, one.law, one.unit) for one in self.event_functions]
         small = MARGIN * tolerance * np.array(sizes)
         self.shift = np.zeros(len(small))
@@ -398,6 +401,10 @@ class EventProbe:
     def values(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the value of each event at a state, shifted where it starts at zero."""
         assert self.kernel is not None
+        values: FloatArray
+        if self.needs == _NOTHING:
+            values = np.asarray(self.kernel([t], q, u, np.zeros_like(self.shift))[0]) + self.shift
+            return values
         reactions: Any = [0.0] * len(self.assembly.reactions)
         accelerations = np.zeros_like(u)
         if self.reactions is not None:
@@ -405,7 +412,7 @@ class EventProbe:
             reactions = found[:, 0]
         if self.needs.accelerations and len(u):
             accelerations, _ = self.plan.balance.accelerate(t, q, u, self.plan.kept)
-        values: FloatArray = np.asarray(self.kernel([t], q, u, accelerations, reactions)[0]) + self.shift
+        values = np.asarray(self.kernel([t], q, u, accelerations, reactions)[0]) + self.shift
         return values
 
     def compiled(self, for_ida: bool) -> EventData | None:
@@ -436,10 +443,14 @@ class EventProbe:
 
     def program(self) -> Program | None:
         """Return the events as a program of (t, q, u, shift); see `atwood.forms.event_program.event_program`."""
-        from atwood.forms.event_program import event_program
-
         kept, maximal, _ = self.key
-        return event_program(self.assembly, [one.value for one in self.event_functions], kept, maximal)
+
+        def make() -> Program | None:
+            from atwood.forms.event_program import event_program
+
+            return event_program(self.assembly, [one.value for one in self.event_functions], kept, maximal)
+
+        return self.assembly.shared.get(_EVENT_PROGRAM, make, *self.key)
 
     def function(self) -> Callable[[float, FloatArray, FloatArray], FloatArray] | None:
         """Return the events as a function of the solver's vector; None if nothing is watched."""

@@ -151,6 +151,8 @@ def _has_root(value: Expression) -> bool:
 
 
 def _curved_in(outputs: Sequence[Expression], operations: frozenset[str]) -> Iterable[Curved]:
+    if not outputs or operations.isdisjoint(outputs[0].graph.operations):
+        return
     nodes = live(outputs)
     faint = _faint(outputs, nodes)
     for node in nodes:
