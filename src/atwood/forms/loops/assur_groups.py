@@ -179,9 +179,7 @@ class Loops:
         """Return which coordinates each constraint depends on, by more than rounding."""
         found = jacobian(self.values, list(self.q))
         entries = list(found.entries)
-        sure = np.zeros(len(entries), dtype=bool)
-        for other in self.elsewhere:
-            sure |= ~rounds_to_zero(entries, self.place.parameters, other)
+        sure = ~rounds_to_zero(entries, self.place.parameters, *self.elsewhere)
         reads: list[set[int]] = [set() for _ in self.values]
         for row, column, is_sure in zip(found.rows, found.columns, sure, strict=True):
             if is_sure:
@@ -197,9 +195,7 @@ class Loops:
     def vanish(self, values: Vector) -> bool:
         """Return whether values are zero but for rounding, wherever coordinates are."""
         moving = [one for one in values if not one.is_zero]
-        return not moving or all(
-            bool(rounds_to_zero(moving, self.place.parameters, other).all()) for other in self.elsewhere
-        )
+        return not moving or bool(rounds_to_zero(moving, self.place.parameters, *self.elsewhere).all())
 
     def agree(self, values: Vector, others: Vector) -> bool:
         """Return whether values are those of others but for rounding, wherever coordinates are."""

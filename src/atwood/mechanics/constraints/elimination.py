@@ -214,21 +214,25 @@ def rough_place(values: Mapping[Expression, float]) -> RoughPlace:
 def rounds_to_zero(
     expressions: Sequence[Expression],
     parameters: Mapping[Expression, float],
-    place: Mapping[Expression, float] | RoughPlace | None = None,
+    *places: Mapping[Expression, float] | RoughPlace,
 ) -> NDArray[np.bool_]:
-    """Return which expressions are no larger than what rounding could have made of them."""
+    """Return which expressions are no larger than what rounding could have made of them, at all of some places."""
     if all(one.is_constant for one in expressions):
         return np.array([one.is_zero for one in expressions], dtype=bool)
-    where = place if isinstance(place, RoughPlace) else rough_place(place or {})
-    nodes = live(expressions)
+    nodes, found = live(expressions), np.ones(len(expressions), dtype=bool)
+    every = [one if isinstance(one, RoughPlace) else rough_place(one) for one in places or [{}]]
     read = [node for node in nodes if node.is_symbol]
-    own, moving = ([one for one in read if one in known] for known in (parameters, where.rows))
-    held = np.array([parameters[one] for one in own])
-    ways = RoughProgram((own, moving), list(expressions), nodes)(held, where.near[[where.rows[one] for one in moving]])
-    known = {**{one: parameters[one] for one in own}, **{one: where.values[one] for one in moving}}
-    numbers = np.abs(evaluate(expressions, known, nodes))
-    spread = np.maximum(np.ptp(ways, axis=1), ROUGHNESS * numbers)  # not finite next to a place without a value
-    return np.array((numbers <= tolerances.CERTAIN * spread) & np.isfinite(spread), dtype=bool)
+    own, moving = ([one for one in read if one in known] for known in (parameters, every[0].rows))
+    held, program = np.array([parameters[one] for one in own]), RoughProgram((own, moving), list(expressions), nodes)
+    for where in every:
+        ways = program(held, where.near[[where.rows[one] for one in moving]])
+        known = {**{one: parameters[one] for one in own}, **{one: where.values[one] for one in moving}}
+        numbers = np.abs(evaluate(expressions, known, nodes))
+        spread = np.maximum(np.ptp(ways, axis=1), ROUGHNESS * numbers)  # not finite next to a place without a value
+        found &= (numbers <= tolerances.CERTAIN * spread) & np.isfinite(spread)
+        if not found.any():
+            break
+    return found
 
 
 _Place = tuple[Expression | None, Expression]
