@@ -1,10 +1,10 @@
 """What each stage takes of 10, 100, 1,000 and 10,000 bodies: a chain, a tree, a net, ragdolls, a row of four-bars.
 
 Each case is a process of its own with an empty cache: it makes the scene, assembles it, makes a short run, the same
-again, and one to another end. Machine code of its accelerations is written once more, outside the cache: what LLVM takes
-of that, and what writing the text does. Then runs of some steps and of three times that time, in machine code, tell what
-a step takes: their difference, the best of five each. Times are of the processor, memory is the most that the process has
-had so far, less what it had before. A case that takes longer than `LONGEST` is not shown. BLAS has one thread.
+again, and one to another end. Machine code of its accelerations is written once more outside the cache; LLVM takes a
+share of that, and the text the rest. Then runs of some steps and of three times that time, in machine code, tell what
+a step takes: their difference, the best of five each. Times are of the processor, memory is the most that the process
+has had so far, less what it had before. A case that takes longer than `LONGEST` is not shown. BLAS has one thread.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def one_case(name: str, count: int, report: Path) -> None:
 
 
 def _of_code(assembly: Any) -> dict[str, float]:
-    """Write machine code of the accelerations; return the seconds that LLVM takes, and how long its text and code are."""
+    """Write machine code of the accelerations; return what LLVM takes, s, and how long its text and code are."""
     from atwood.codegen.llvm import build
     from atwood.forms.accelerations import accelerations_of
 
