@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import pairwise
 
 from atwood.expr import Expression, InputGroup, OutputGroup, Program, jacobian, solve, substitute
+from atwood.expr.simplify.factors import join_known_factors
 from atwood.forms.program import rates_are_speeds, state_groups
 from atwood.forms.residuals import keep_constraints
 from atwood.lazy_dataclasses import dataclass
@@ -70,7 +71,7 @@ def constrained_program(
     sizes = tuple(graph.symbol(f"size of {one.name}") for one in equations.speed_names)
     held = keep_constraints(equations, kept)
     start = len(graph)
-    found = [*_accelerations(held, rows, sizes, light), *_projection(held, sizes)]  # to keep it would cost what it does
+    found = [*_accelerations(held, rows, parameters, sizes, light), *_projection(held, sizes)]  # to keep it would cost what it does
     graph.forget(start)
     n, m = len(equations.coordinates), len(equations.speeds)
     groups, known = state_groups(equations), (*parameters, *sizes)
@@ -198,14 +199,20 @@ def _balanced(
 
 
 def _accelerations(
-    equations: Equations, rows: Sequence[Expression], sizes: Sequence[Expression], light: Sequence[int]
+    equations: Equations,
+    rows: Sequence[Expression],
+    parameters: Sequence[Expression],
+    sizes: Sequence[Expression],
+    light: Sequence[int],
 ) -> list[Expression]:
     at_rest = dict.fromkeys(equations.accelerations, 0.0)
     balance = _masses(equations, rows)
     bias = substitute(list(rows), at_rest)
     gamma = substitute([one.second for one in equations.constraints], at_rest)
     found = _balanced(*balance, bias, gamma, sizes, light)
-    return _without_rounding(equations, found, sizes) if equations.contacts else found
+    if not equations.contacts:
+        return found
+    return join_known_factors(_without_rounding(equations, found, sizes), (*parameters, *sizes))
 
 
 def _without_rounding(

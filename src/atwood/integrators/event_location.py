@@ -108,8 +108,11 @@ ROWS = {
 }
 """Rows with a number for each event; behind them come points: time, values and slopes of each."""
 
-FIRST, LAST, STACK = range(3)
-"""Points: the first and the last of a part of a step, and those that are still to come."""
+FIRST, LAST, BEGIN, STACK = range(4)
+"""Points: the first and the last of a part of a step, the first of all of it, and those that are still to come."""
+
+NEAR_WHOLE = 1.0 / 16.0
+"""Slopes over a small part of a width serve for a part of it that is no shorter than this share."""
 
 FOUND, NO_STATE, NO_VALUE = 1, 2, 3
 """How a search ends that finds an event, cannot read a state, or an event function."""

@@ -24,6 +24,7 @@ from atwood.codegen.routines import (
 )
 from atwood.codegen.tangents import FULL, SECANT, STEEP
 from atwood.integrators.event_location import (
+    BEGIN,
     FARTHER,
     FIELDS,
     FIRST,
@@ -32,6 +33,7 @@ from atwood.integrators.event_location import (
     LARGEST,
     LAST,
     MOST,
+    NEAR_WHOLE,
     NO_STATE,
     NO_VALUE,
     NOISE,
@@ -183,10 +185,15 @@ def _dip() -> Routine:
         dipping[i] = one
         some.now = some.now | (one != 0.0)
     r.give_if(~(some.now & (begin < end)), 0)
-    a, last, stride, whole = m.point(FIRST), m.point(LAST), m.stride, end - begin
+    a, last, kept, stride, whole = m.point(FIRST), m.point(LAST), m.point(BEGIN), m.stride, end - begin
     r.copy(a, last, stride)
     with r.when(last[0] != begin):
-        do_or_return(r, "point", begin, whole, a)
+        is_known = (kept[0] == begin) & (whole >= (last[0] - begin) * NEAR_WHOLE)
+        with r.when(is_known):
+            r.copy(a, kept, stride)
+        with r.when(~is_known):
+            do_or_return(r, "point", begin, whole, a)
+    r.copy(kept, a, stride)
     do_or_return(r, "point", end, begin - end, last)
     r.copy(m.point(STACK), last, stride)
     depth, count, share = r.variable(0, INTEGER), r.variable(0, INTEGER), r.variable(FULL)
@@ -261,8 +268,11 @@ def _narrow() -> Routine:
     r, m, (begin, end, tolerance) = _open("narrow", dict.fromkeys(("begin", "end", "tolerance"), NUMBER))
     known, lower, upper, crossed, count = *map(m.row, ("known", "lower", "upper", "crossed")), m.count
     r.copy(upper, known, count)  # the end was read last
-    do_or_return(r, "read", begin)
-    r.copy(lower, known, count)
+    first = m.point(BEGIN)
+    r.copy(lower, first.at(1), count)
+    with r.when(first[0] != begin):
+        do_or_return(r, "read", begin)
+        r.copy(lower, known, count)
     b, e, width, guesses = r.variable(begin), r.variable(end), r.variable(end - begin), r.variable(0, INTEGER)
     bisects = r.variable(False, BOOLEAN)
     with r.forever() as loop:
@@ -426,7 +436,7 @@ def _restart() -> Routine:
         sign[i] = r.choose(is_unsure, 0.0, r.choose(is_carried, one, _sign(r, value)))
         blind[i] = -inf
     m.start, m.settling, m.is_first = t, 1, 0
-    m.point(LAST)[0] = nan
+    m.point(LAST)[0] = m.point(BEGIN)[0] = nan
     r.give(0)
     return r
 

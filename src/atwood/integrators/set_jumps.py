@@ -91,8 +91,11 @@ class SetLog(JumpLog):
     def closings(self, was_open: bool) -> list[SetJump]:
         """Return the changes by which something touches, slips or sticks where all was open before."""
         units = (self._ends - self._begins) // 3
-        touches: BoolArray = np.any(self.entries[:, self._begins : self._begins + units], axis=1)
-        return self.changes(touches & np.append(was_open, ~touches[:-1]))
+        touches: BoolArray = np.logical_or.reduce(self.entries[:, self._begins : self._begins + units], axis=1)
+        begins = touches.copy()
+        begins[0] &= was_open
+        begins[1:] &= ~touches[:-1]
+        return self.changes(begins)
 
     def strikes(self) -> list[tuple[float, int]]:
         """Return times and gaps of the impacts."""

@@ -184,7 +184,8 @@ def test_jaws_close_on_a_box_and_hold_it_until_it_is_pulled_too_hard(form: str) 
     first = math.sqrt(2.0 * 0.02 / 20.0)
     assert times(result, "impact")[0] == pytest.approx(first, abs=1e-12)
     assert len(times(result, "impact")) == 2
-    assert times(result, "slips") == pytest.approx([2.0 / 3.0, 2.0 / 3.0], abs=1e-12)
+    # Which share each takes is known but for rounding, so one may slip first, and the other when it is past its margin.
+    assert times(result, "slips") == pytest.approx([2.0 / 3.0, 2.0 / 3.0], abs=1e-9)
     assert result.energy.max_drift < 1e-9
 
 

@@ -404,15 +404,16 @@ def _run(pair: Tableau) -> Routine:
         r.give_if(r.call("watched", m.session, t) != 0, _NOTICED)
         with r.when(m.crossed != 0):
             r.repeat(steps)
-        begin, end = m.row(0), m.row("end slope")
-        r.copy(begin, end, m.padded)
+        begin, end, y_old, y, trial = (m.row(one) for one in (0, "end slope", "y_old", "y", "trial"))
+        with m.parts() as j:
+            begin[j] = m.lanes(end, j)
         m.is_dense = 0
         with r.when(r.call("attempt", m.session) != 0):
             r.copy(end, begin, m.padded)
             r.give(_TOO_SMALL)
         stiffens = (r.call("stability", m.session, m.h) != 0) & (m.watches_stiffness != 0)
-        r.copy(m.row("y_old"), m.row("y"), m.padded)
-        r.copy(m.row("y"), m.row("trial"), m.padded)
+        with m.parts() as j:
+            y_old[j], y[j] = m.lanes(y, j), m.lanes(trial, j)
         t_new = m.t
         is_seen = r.call("watched", m.session, t_new) != 0
         happens = r.call("look", m.session, t_new) != 0

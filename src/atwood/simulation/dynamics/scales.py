@@ -137,10 +137,10 @@ def smaller_size(length: float, passed: Iterable[tuple[Sequence[Coordinate], Flo
     least: dict[str, float] = {}
     most: dict[str, float] = {}
     for names, rows in passed:
-        for one, row in zip(names, rows, strict=False):
+        for one, lowest, highest in zip(names, rows.min(axis=1).tolist(), rows.max(axis=1).tolist(), strict=False):
             if one.unit == "m":
-                least[one.name] = min(least.get(one.name, np.inf), float(np.min(row)))
-                most[one.name] = max(most.get(one.name, -np.inf), float(np.max(row)))
+                least[one.name] = min(least.get(one.name, np.inf), lowest)
+                most[one.name] = max(most.get(one.name, -np.inf), highest)
     moved = max((most[one] - least[one] for one in most), default=0.0)
     farthest = max((max(abs(least[one]), abs(most[one])) for one in most), default=0.0)
     return moved if max(_NO_EXTENT * length, _ROUNDING * farthest) < moved < TOO_LARGE * length else 0.0
