@@ -96,7 +96,7 @@ def acceleration_program(assembly: Assembly, method: Method | None = None) -> Ac
     equations = assembly.reduced
     if equations.constraints:
         return None
-    tree = _is_tree(assembly) if equations.speeds and method in _OF_TREES else False
+    tree = is_tree(assembly) if equations.speeds and method in _OF_TREES else False
     read = _read(equations), _read(assembly.maximal) if tree else None, assembly.parameters, method
     word, found = derive_once("accelerations", equations.graph, read, lambda: _cheapest(assembly, method, tree))
     if not word:
@@ -208,7 +208,7 @@ def _solve_in_order(entries: Mapping[tuple[int, int], Expression], right: Sequen
 # -- the augmented system -----------------------------------------------------------------------------------------
 
 
-def _is_tree(assembly: Assembly) -> bool:
+def is_tree(assembly: Assembly) -> bool:
     """Return whether the joints of a mechanism form a tree in which each takes away freedom of its own."""
     reduced = assembly.reduced
     if reduced.eliminated or reduced.solved_speeds or reduced.forest.loop_joints:

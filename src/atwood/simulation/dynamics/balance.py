@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from atwood.arrays import FloatArray
 from atwood.codegen import BoundKernel
 from atwood.errors import SolveError
-from atwood.forms.accelerations import accelerations_of
+from atwood.forms.accelerations import accelerations_of, is_tree
 from atwood.forms.assembly import Assembly, FormName
 from atwood.forms.balance_program import BalanceProgram
 from atwood.forms.caches import Key
@@ -32,7 +32,7 @@ from atwood.numerics.matrices import (
 from atwood.numerics.newton import Missing, newton
 from atwood.numerics.rank import row_scales
 from atwood.numerics.sparse import solve_bordered
-from atwood.simulation.dynamics.kinematic_map import KinematicMap, kinematic_map_of
+from atwood.simulation.dynamics.kinematic_map import kinematic_map_of
 from atwood.simulation.dynamics.rounding import RowErrors
 from atwood.tolerances import tolerances
 
@@ -83,49 +83,53 @@ class ConstraintValues:
 
 
 class Balance:
-    """The balance of forces of one form with its parameters.
+    """The balance of forces of a scene in the coordinates of either form, written down when it is first asked for.
 
-    Parameters
+    Attributes
     ----------
-    program
-        The program.
-    kernel, constraint_kernel
-        Give the same, and the constraints alone, ready to run on one state.
     kinematic_map
         How the coordinates move with the speeds.
-    errors
-        How far rounding can take the constraint Jacobian.
-    mass
-        Gives the mass matrix where the program does not.
-    accelerations
-        Gives the accelerations without that matrix; None where nothing does.
+    constraints
+        Number of constraints.
+    holonomic
+        Numbers of those that hold positions.
     """
 
-    def __init__(
-        self,
-        program: BalanceProgram,
-        kernel: Callable[[], BoundKernel],
-        constraint_kernel: Callable[[], BoundKernel],
-        kinematic_map: KinematicMap,
-        errors: RowErrors,
-        mass: Callable[[float, FloatArray, FloatArray], FloatArray] | None = None,
-        accelerations: Callable[[], BoundKernel | None] = lambda: None,
-    ) -> None:
-        self.program, self._kernel, self.kinematic_map = program, kernel, kinematic_map
-        self.errors, self._mass, self._accelerations = errors, mass, accelerations
-        self._all = len(program.holonomic) == program.constraints
-        self._constraint_kernel = constraint_kernel
-        self.holonomic = np.asarray(program.holonomic, dtype=np.intp)
-        self.constraints = program.constraints
+    def __init__(self, assembly: Assembly, form: FormName) -> None:
+        self._assembly, self._form = assembly, form
+        self._laws = assembly.in_coordinates(form).constraints
+        self.kinematic_map, self.constraints = kinematic_map_of(assembly, form), len(self._laws)
+        self.holonomic = np.array([i for i, one in enumerate(self._laws) if one.holonomic], dtype=np.intp)
+        self._all = len(self.holonomic) == self.constraints
+
+    @cached_property
+    def program(self) -> BalanceProgram:
+        """The program, as it is in the present states."""
+        return balance_now(self._assembly, self._form)
+
+    @cached_property
+    def errors(self) -> RowErrors:
+        """How far rounding can take the constraint Jacobian."""
+        program = self.program
+        places, laws = (program.jacobian_rows, program.jacobian_columns), [one.key[:2] for one in self._laws]
+        groups = ("value", "jacobian", "explicit_rate")
+        return RowErrors(self._assembly, program.constraints_alone, groups, laws, places, self.kinematic_map)
+
+    @property
+    def formulas(self) -> BoundKernel | None:
+        """What gives accelerations where a mass matrix is better never made, and formulas without contacts do."""
+        assembly = self._assembly
+        found = accelerations_of(assembly) if is_wide(assembly, self._form) and not assembly.reduced.contacts else None
+        return None if found is None else assembly.kernel(found.program)
 
     def at(self, t: float, q: FloatArray, u: FloatArray) -> BalanceValues:
         """Return the balance at a state."""
         p = self.program
-        mass, bias, value, rate, gamma, entries, explicit_rate = self._kernel()([t], q, u)
-        full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(mass))
+        mass, bias, value, rate, gamma, entries, explicit_rate = self._assembly.kernel(p.program)([t], q, u)
+        full = p.mass_product is not None or is_best_full((p.speeds, p.speeds), len(mass))
         matrix: Any
-        if self._mass is not None:
-            matrix = partial(self._mass, t, q, u)
+        if p.mass_product is not None:
+            matrix = partial(mass_at, self._assembly, self._form, t, q, u)
         else:
             matrix = from_entries(p.mass_rows, p.mass_columns, mass, (p.speeds, p.speeds), full)
         jacobian = from_entries(p.jacobian_rows, p.jacobian_columns, entries, (p.constraints, p.speeds), full)
@@ -136,8 +140,8 @@ class Balance:
     def constraints_at(self, t: float, q: FloatArray, u: FloatArray) -> ConstraintValues:
         """Return the constraints at a state."""
         p = self.program
-        value, entries, explicit_rate = self._constraint_kernel()([t], q, u)
-        full = self._mass is not None or is_best_full((p.speeds, p.speeds), len(p.mass_rows))
+        value, entries, explicit_rate = self._assembly.kernel(p.constraints_alone)([t], q, u)
+        full = p.mass_product is not None or is_best_full((p.speeds, p.speeds), len(p.mass_rows))
         matrix = from_entries(p.jacobian_rows, p.jacobian_columns, entries, (p.constraints, p.speeds), full)
         return ConstraintValues(np.asarray(value, dtype=float), matrix, np.asarray(explicit_rate, dtype=float))
 
@@ -150,7 +154,7 @@ class Balance:
         now: BalanceValues | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return accelerations and multipliers; `now` is the balance there, if it is known."""
-        kernel = self._accelerations()
+        kernel = self.formulas
         if kernel is not None:
             return np.asarray(kernel([t], q, u)[-1], dtype=float), np.zeros(0)
         return solve_balance(self.at(t, q, u) if now is None else now, kept, t)
@@ -197,7 +201,7 @@ class Balance:
 
     def holding(self, chosen: Sequence[int]) -> list[int]:
         """Return which of some constraints hold positions."""
-        return [i for i in chosen if self._all or i in self.program.holonomic]
+        return [i for i in chosen if self._all or i in self.holonomic]
 
     def misses(self, t: float, q: FloatArray, u: FloatArray, scales: FloatArray) -> tuple[float, float]:
         """Return by how much a state misses the constraints on position and on velocity, relative to the scales."""
@@ -210,30 +214,14 @@ class Balance:
 
 def balance_of(assembly: Assembly, form: FormName) -> Balance:
     """Return the balance of forces of a scene in the coordinates of either form."""
-    return assembly.kept.get(_BALANCES[form], lambda: _balance_of(assembly, form))
+    return assembly.kept.get(_BALANCES[form], lambda: Balance(assembly, form))
 
 
-def _balance_of(assembly: Assembly, form: FormName) -> Balance:
-    program = balance_now(assembly, form)
-    mass = None if program.mass_product is None else partial(mass_at, assembly, form)
-    held = partial(assembly.kernel, program.constraints_alone)
-    places, kinematic_map = (program.jacobian_rows, program.jacobian_columns), kinematic_map_of(assembly, form)
-    laws = [one.key[:2] for one in assembly.in_coordinates(form).constraints]
-    groups = ("value", "jacobian", "explicit_rate")
-    errors = RowErrors(assembly, program.constraints_alone, groups, laws, places, kinematic_map)
-    solved = partial(_accelerations, assembly, program)
-    return Balance(program, partial(assembly.kernel, program.program), held, kinematic_map, errors, mass, solved)
-
-
-def is_wide(program: BalanceProgram) -> bool:
-    """Return whether a mass matrix is full and so large that it is better never made."""
-    return program.mass_product is not None and program.speeds > LARGEST_FULL
-
-
-def _accelerations(assembly: Assembly, program: BalanceProgram) -> BoundKernel | None:
-    """Return what gives accelerations where a mass matrix is better never made, and formulas without contacts do."""
-    found = accelerations_of(assembly) if is_wide(program) and not assembly.reduced.contacts else None
-    return None if found is None else assembly.kernel(found.program)
+def is_wide(assembly: Assembly, form: FormName) -> bool:
+    """Return whether a mass matrix is better never made: one of a large tree, or that is large and full."""
+    if form != "reduced" or len(assembly.reduced.speeds) <= LARGEST_FULL:
+        return False
+    return is_tree(assembly) or balance_now(assembly, form).mass_product is not None
 
 
 def solve_balance(now: BalanceValues, kept: NDArray[np.intp] | None, t: float) -> tuple[FloatArray, FloatArray]:

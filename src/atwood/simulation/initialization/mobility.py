@@ -12,7 +12,6 @@ from atwood.errors import StartError, TopologyError
 from atwood.expr import Expression, OutputGroup, Program, SparseMatrix, depends_on, is_zero, jacobian
 from atwood.forms.assembly import Assembly
 from atwood.forms.caches import Key
-from atwood.forms.loose import balance_now
 from atwood.forms.program import state_groups
 from atwood.forms.quantities import known_program
 from atwood.lazy_dataclasses import dataclass
@@ -193,7 +192,7 @@ def check_massless_directions(
 ) -> None:
     """Refuse a direction in which something can move without inertia."""
     n = len(now.bias)
-    if n == 0 or (is_wide(balance_now(assembly, assembly.form)) and _bodies_have_inertia(assembly, *state)):
+    if n == 0 or (is_wide(assembly, assembly.form) and bodies_have_inertia(assembly, *state)):
         return
     mass = now.mass
     sizes = _sizes_of_inertia(mass, sizes)
@@ -220,10 +219,10 @@ def check_massless_directions(
 _INERTIA: Key[tuple[Program, SparseMatrix]] = Key("inertia of bodies")
 
 
-def _bodies_have_inertia(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> bool:
+def bodies_have_inertia(assembly: Assembly, t: float, q: FloatArray, u: FloatArray) -> bool:
     """Return whether each body has inertia in all its directions, and none so much more that others' is rounding.
 
-    Then there is inertia along all generalized coordinates, and their mass matrix, which is full, need not be made.
+    Then there is inertia along all generalized coordinates, and their mass matrix, which is large, need not be made.
     """
     maximal = assembly.maximal
 

@@ -25,12 +25,12 @@ from atwood.mechanics.dynamics.equations import Equations
 from atwood.model.declare.component import bind
 from atwood.model.local.parts import LocalPart
 from atwood.model.values.space import Vector
-from atwood.simulation.dynamics.balance import balance_of
+from atwood.simulation.dynamics.balance import balance_of, is_wide
 from atwood.simulation.dynamics.numerical_failure import ADVICE_AT_START, undefined_value_at
 from atwood.simulation.dynamics.reactions import check_read_reactions
 from atwood.simulation.dynamics.redundancy import RankFinding, find_rank
 from atwood.simulation.dynamics.scales import coordinate_scales, find_scales, motion_scales, seen_from_afar
-from atwood.simulation.initialization.mobility import check_massless_directions
+from atwood.simulation.initialization.mobility import bodies_have_inertia, check_massless_directions
 from atwood.simulation.problem.problem import SceneProblem, dependent_speeds_of, kept_rows
 
 _PLAN: Key[SceneProblem] = Key("plan")
@@ -81,24 +81,29 @@ def _make_problem(
     sizes, coordinate_sizes = motion_scales(equations, length), coordinate_scales(equations, length)
     finding = find_rank(balance, t, q, sizes)
     check_read_reactions(assembly, t, q, u, length)
+    # Of a large tree, masses and forces are then not written down.
+    by_formulas = is_wide(assembly, assembly.form) and bodies_have_inertia(assembly, t, q, u) and balance.formulas
     try:
-        now = balance.at(t, q, u)
+        now = None if by_formulas else balance.at(t, q, u)
+        accelerations = balance.accelerate(t, q, u)[0] if now is None else None
     except KernelEvaluationError as error:
         raise StartError(
             f"at the start a law has no value: {error.message}",
             where=assembly.flat.name,
             advice=ADVICE_AT_START,
         ) from error
-    constraint_jacobian = now.jacobian[list(finding.kept)] if finding.kept else now.jacobian[:0]
-    check_massless_directions(assembly, now, constraint_jacobian, sizes, (t, q, u))
+    if now is not None:
+        constraint_jacobian = now.jacobian[list(finding.kept)] if finding.kept else now.jacobian[:0]
+        check_massless_directions(assembly, now, constraint_jacobian, sizes, (t, q, u))
     if finding.starts_singular:
         raise _singular_start(assembly, finding)
     dependent: tuple[tuple[int, ...], tuple[int, ...]] = (), ()
-    if assembly.form == "reduced" and finding.kept:
+    if assembly.form == "reduced" and now is not None and finding.kept:
         dependent = dependent_speeds_of(balance, finding, now.jacobian, sizes)
     program = assembly.form_program(kept_rows(finding), *dependent)
     kept = np.asarray(finding.kept, dtype=np.intp) if finding.redundant else None
-    accelerations, _ = balance.accelerate(t, q, u, kept, now)
+    if accelerations is None:
+        accelerations, _ = balance.accelerate(t, q, u, kept, now)
     share, moving = seen_from_afar(assembly, q, u, length, span)
     scales = find_scales(assembly, length, moving, accelerations, sizes, span)
     not_compilable = find_not_compilable(assembly)
