@@ -13,13 +13,14 @@ coordinates, in terms of which everything is written.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import reduce
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from functools import partial, reduce
 from operator import add
 from typing import TYPE_CHECKING, Literal, cast
 
 from atwood.errors import AtwoodError
 from atwood.expr import Expression, OutputGroup, Program, jacobian, live, solve, substitute
+from atwood.expr.core.graph import MANY
 from atwood.expr.simplify.collect import cost_of_nodes
 from atwood.expr.simplify.polynomial import Effort
 from atwood.forms.caches import Key, derive_once
@@ -120,57 +121,78 @@ def _read(equations: Equations) -> list[object]:
     return [getattr(equations, name) for name in names_of(type(equations)) if name not in _NOT_READ]
 
 
+_Made = tuple[Method, list[Expression]]
+_Way = Callable[[], _Made | None]
+"""Derives accelerations in one way; None where it does not apply."""
+
+
 def _cheapest(assembly: Assembly, method: Method | None, is_tree: bool) -> tuple[str, list[Expression]]:
-    """Return the method whose accelerations cost least, and these; an empty word where none applies."""
-    best: tuple[int, Method, list[Expression]] | None = None
-    for name, found in _candidates(assembly, method, is_tree):
-        price = _price(found, assembly.parameters)
+    """Return the method whose accelerations cost least, and these; an empty word where none applies.
+
+    Of a large scene those of one way are there at a time: the best are derived again if others came after them.
+    """
+    graph, ways = assembly.reduced.graph, _ways(assembly, method, is_tree)
+    start, way = len(graph), next(ways, None)
+    best: tuple[int, _Way] | None = None
+    kept: _Made | None = None
+    while way is not None:
+        if len(graph) > MANY:
+            kept = None
+            graph.forget(start)
+        made = way()
+        if made is None:
+            break
+        price, waves = _price(made[1], assembly.parameters)
         if best is None or price < best[0]:
-            best = price, name, found
-    return ("", []) if best is None else best[1:]
+            best, kept = (price, way), made
+        del made
+        try:
+            way = ways.send(waves)
+        except StopIteration:
+            break
+    if best is not None and kept is None:
+        graph.forget(start)
+        kept = best[1]()
+    return kept or ("", [])
 
 
-def _price(values: Sequence[Expression], parameters: Sequence[Expression]) -> int:
-    """Return what an evaluation costs, where a sine comes with the cosine of the same angle for little more."""
+def _price(values: Sequence[Expression], parameters: Sequence[Expression]) -> tuple[int, int]:
+    """Return what an evaluation costs, and the number of sines and cosines of what varies.
+
+    A sine comes with the cosine of the same angle for little more.
+    """
     nodes = live(values)
-    waves = _waves(nodes)
-    return cost_of_nodes(nodes, parameters) - _PAIR * (len(waves) - len({wave.arguments[0] for wave in waves}))
+    waves = [n for n in nodes if n.operation in ("sin", "cos") and not n.is_parametric]
+    pairs = len(waves) - len({wave.arguments[0] for wave in waves})
+    return cost_of_nodes(nodes, parameters) - _PAIR * pairs, len(waves)
 
 
-def _waves(nodes: Sequence[Expression]) -> list[Expression]:
-    """Return the sines and cosines of what varies."""
-    return [n for n in nodes if n.operation in ("sin", "cos") and not n.is_parametric]
-
-
-def _candidates(assembly: Assembly, method: Method | None, is_tree: bool) -> Iterator[tuple[Method, list[Expression]]]:
-    """Yield the accelerations in the ways that apply."""
+def _ways(assembly: Assembly, method: Method | None, is_tree: bool) -> Generator[_Way, int, None]:
+    """Yield the ways that apply, and take how many sines and cosines of what varies there are in each."""
     equations = assembly.reduced
     if not equations.speeds:
-        yield "mass matrix", []
+        yield lambda: ("mass matrix", [])
         return
     tree: _Tree | None = None
     if is_tree:
         tree = _Tree(assembly)
         for name, order in tree.orders():
             for differences in (True, False) if method in (None, name) else ():
-                found = tree.accelerations(order, differences)
-                if found is None:
-                    return
-                yield name, found
-                if len(_waves(live(found))) <= 2 * len(tree.angles):
+                waves = yield partial(tree.made, name, order, differences)
+                if waves <= 2 * len(tree.angles):
                     if name == "joint forces" and len(tree.u) > _FEW and tree.rewrites:
                         return  # nothing can be much shorter
                     break
     if method == "numeric":
-        yield _by_mass_matrix(equations, assembly.rows, True)
+        yield lambda: _by_mass_matrix(equations, assembly.rows, True)
     elif method == "mass matrix" or (method is None and (tree is None or not tree.works or len(tree.u) <= tree.few)):
-        yield _by_mass_matrix(equations, assembly.rows, False)
+        yield lambda: _by_mass_matrix(equations, assembly.rows, False)
 
 
 # -- the mass matrix ----------------------------------------------------------------------------------------------
 
 
-def _by_mass_matrix(equations: Equations, rows: Sequence[Expression], numeric: bool) -> tuple[Method, list[Expression]]:
+def _by_mass_matrix(equations: Equations, rows: Sequence[Expression], numeric: bool) -> _Made:
     """Return the accelerations from ``M a + bias = 0``."""
     found = jacobian(list(rows), list(equations.accelerations))
     bias = substitute(list(rows), dict.fromkeys(equations.accelerations, 0.0))
@@ -308,6 +330,11 @@ class _Tree:
         for name, order in (*masses_first, ("leaves to root", [number for _, _, number in sorted(both)])):
             if fill_of(list(self.system.entries), order) <= _MUCH * len(order):
                 yield name, order
+
+    def made(self, method: Method, order: Sequence[int], differences: bool) -> _Made | None:
+        """Return the accelerations with the method that they are derived by."""
+        found = self.accelerations(order, differences)
+        return None if found is None else (method, found)
 
     def accelerations(self, order: Sequence[int], differences: bool) -> list[Expression] | None:
         """Return the accelerations of the generalized coordinates, by elimination in an order.

@@ -11,6 +11,7 @@ Each group of words begins with a code and a count.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Iterable, Sequence
 from math import nan
 from weakref import WeakKeyDictionary
@@ -103,7 +104,7 @@ class _Writer:
         self.known = places_of(body)
         self.constants: list[float] = []
         self.places: dict[int, int] = {}
-        self.words: list[int] = []
+        self.words = array("i")
         self.regions: dict[MatrixKey, int] = {}
         self.tables: dict[str, int] = {}
         self.kept: dict[int, Expression] = {}
@@ -117,13 +118,13 @@ class _Writer:
         self.end = len(self.constants)
         for pointer, given in self.body.given:
             number = 0 if pointer == "derived" else 1 + int(pointer.removeprefix("in"))
-            self.words += [_CODES["copy"], len(given), number]
+            self.words.extend((_CODES["copy"], len(given), number))
             self._place([node.index for node in given])
         for kind, group in groups:
             self._write(kind, *group)
         self._write_results()
-        padding = [0] * (1 + len(self.words) % 2)
-        words = np.array([*self.words, _CODES["end"], *padding], dtype=np.int32)
+        self.words.extend((_CODES["end"], *[0] * (1 + len(self.words) % 2)))
+        words = np.frombuffer(self.words, dtype=np.intc)
         head = np.array([len(self.constants)], dtype=np.int64).view(np.float64)
         return Tape(np.concatenate([head, self.constants, words.view(np.float64)]), self.end)
 
@@ -199,7 +200,8 @@ class _Writer:
             if kind in self.tables:
                 code, head = f"call{OWN_FUNCTIONS[kind]}" if kind in OWN_FUNCTIONS else kind, [self.tables[kind]]
             count = len(indices) // 2 if kind == "sin_cos" else len(indices)
-            self.words += [_CODES[code], count, *head, *map(places.__getitem__, read)]
+            self.words.extend((_CODES[code], count, *head))
+            self.words.extend(map(places.__getitem__, read))
             self._place(indices)
 
     def _solve(self, node: Expression) -> None:
@@ -207,15 +209,15 @@ class _Writer:
         size, key = node.payload, matrix_key(node)
         entries = [self.places[one.index] for one in node.arguments]
         if size <= LARGEST_UNROLLED:
-            self.words += [_CODES["small"], size, *entries]
+            self.words.extend((_CODES["small"], size, *entries))
             self.places[node.index] = self.end + size * size
             self.end += size * (size + 1)
             return
         if key not in self.regions:
-            self.words += [_CODES["factorise"], size, *entries[: size * size]]
+            self.words.extend((_CODES["factorise"], size, *entries[: size * size]))
             self.regions[key] = self.end
             self.end += size * (size + 1)
-        self.words += [_CODES["substitute"], size, self.regions[key], *entries[size * size :]]
+        self.words.extend((_CODES["substitute"], size, self.regions[key], *entries[size * size :]))
         self.places[node.index] = self.end
         self.end += size
 
@@ -224,7 +226,7 @@ class _Writer:
         for node, pointer, position in self.body.results:
             groups.setdefault(pointer, []).extend((self.places[node.index], position))
         for pointer, pairs in groups.items():
-            self.words += [_CODES["store"], len(pairs) // 2, int(pointer.removeprefix("out")), *pairs]
+            self.words.extend((_CODES["store"], len(pairs) // 2, int(pointer.removeprefix("out")), *pairs))
 
 
 def write_routines() -> list[Routine]:
