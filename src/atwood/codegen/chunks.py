@@ -6,7 +6,8 @@ A long program is cut into functions that hand values on through the scratch arr
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 
 from atwood.codegen.llvm.layout import Body, Layout, MatrixKey, Unit, lay_out, matrix_key, places_of, targets_of
 from atwood.codegen.llvm.text import OWN_FUNCTIONS
@@ -19,8 +20,17 @@ from atwood.lazy_dataclasses import dataclass
 _LONGEST = 500
 """Operations in one function."""
 
-FUNCTIONS = {one: own_name(one) for one in OWN_FUNCTIONS}
-CHOICES = {"minimum": "<=", "maximum": ">="}
+_LARGEST_INLINE = 24
+"""Operations in one expression."""
+
+_FUNCTIONS = {one: own_name(one) for one in OWN_FUNCTIONS}
+_CHOICES = {"minimum": "<=", "maximum": ">="}
+_SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+_COMPARED = {"less": "<", "less_equal": "<="}
+_LOGICAL = {"logical_and": "&&", "logical_or": "||"}
+_CONDITIONS = frozenset({*_COMPARED, *_LOGICAL, "logical_not"})
+_TWICE = frozenset({"minimum", "maximum", "sign"})
+"""What mentions its arguments more than once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +84,24 @@ def write_places(body: Body, at: Callable[[str, int], str]) -> Places:
 
 
 class ChunkWriter(ABC):
-    """What has been written of one chunk of operations.
+    """What has been written of one chunk of operations; what is used once stands where it is used.
 
-    Texts are those of values, with the operations in them; ``declares`` begins the declaration of one with a name.
+    Texts are those of values, with the operations in them. Of a language there are its name, what the declaration of
+    a value with a name begins with, functions that it calls otherwise, the sign between what differs, and one and zero.
     """
 
+    language: str
     declares: str
+    functions: Mapping[str, str]
+    differs: str
+    bits: tuple[str, str]
 
     def __init__(self, places: Places, chunk: Sequence[Unit], factorised: set[MatrixKey]) -> None:
-        self.places, self.chunk, self.factorised = places, chunk, factorised
+        self.places, self.factorised = places, factorised
+        own = [node for unit in chunk for node in unit]
+        self.uses = Counter(one.index for node in own if node.operation != "component" for one in node.arguments)
+        twice = (one.index for node in own if node.operation in _TWICE for one in node.arguments)
+        self.uses.update(twice)
         self.lines: list[str] = []
         self.sums: list[str] = []
         self.texts: dict[int, tuple[str, int]] = {}
@@ -96,12 +115,68 @@ class ChunkWriter(ABC):
         """Write a sine and a cosine, and return where they are."""
 
     @abstractmethod
-    def node(self, node: Expression) -> None:
-        """Write an operation."""
+    def literal(self, value: float) -> str:
+        """Return a number."""
 
-    @abstractmethod
     def value(self, node: Expression) -> str:
         """Return the text of a value that is used once."""
+        return self._text(node)[0]
+
+    def _text(self, node: Expression) -> tuple[str, int]:
+        found = self.texts.get(node.index)
+        if found is None:
+            if node.operation == "constant":
+                found = self.literal(float(node.payload)), 0
+            else:
+                found = self.places.known[node.index], 0
+                if self.uses[node.index] > 1:
+                    self.keep(node, found[0])
+                    return self.texts[node.index]
+            self.texts[node.index] = found
+        return found
+
+    def node(self, node: Expression) -> None:
+        """Write an operation."""
+        size = 1 + sum(self._text(one)[1] for one in node.arguments)
+        parts = [self._text(one)[0] for one in node.arguments]
+        self.texts[node.index] = self._expression(node, parts), size
+        if self.uses[node.index] != 1 or size > _LARGEST_INLINE:
+            self.name(node)
+
+    def _expression(self, node: Expression, parts: list[str]) -> str:
+        operation, (one, zero) = node.operation, self.bits
+        if operation in _SIGNS:
+            return f"({parts[0]} {_SIGNS[operation]} {parts[1]})"
+        if operation == "neg":
+            return f"(-{parts[0]})"
+        if operation in self.functions or operation in _FUNCTIONS:
+            return f"{self.functions.get(operation) or _FUNCTIONS[operation]}({', '.join(parts)})"
+        if operation in _CHOICES:
+            return f"({parts[0]} {_CHOICES[operation]} {parts[1]} ? {parts[0]} : {parts[1]})"
+        if operation == "sign":
+            return f"({parts[0]} > {zero} ? {one} : {parts[0]} < {zero} ? -{one} : {parts[0]} * {zero})"
+        if operation == "select":
+            return f"({self._truth(node.arguments[0])} ? {parts[1]} : {parts[2]})"
+        if operation in _CONDITIONS:
+            return f"({self._compared(node)} ? {one} : {zero})"
+        raise UnsupportedError(f"there is no {self.language} for the operation {operation} in {node!r}")
+
+    def _truth(self, node: Expression) -> str:
+        text, size = self._text(node)
+        return (
+            self._compared(node)
+            if size and node.operation in _CONDITIONS
+            else f"({text} {self.differs} {self.bits[1]})"
+        )
+
+    def _compared(self, node: Expression) -> str:
+        if node.operation in _COMPARED:
+            a, b = (self._text(one)[0] for one in node.arguments)
+            return f"({a} {_COMPARED[node.operation]} {b})"
+        found = [self._truth(one) for one in node.arguments]
+        if node.operation == "logical_not":
+            return f"(!{found[0]})"
+        return f"({found[0]} {_LOGICAL[node.operation]} {found[1]})"
 
     def keep(self, node: Expression, text: str) -> None:
         """Give a value a name."""

@@ -6,19 +6,15 @@ proportion to the length of a function.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 
 from atwood.codegen.c.printer import literal
-from atwood.codegen.chunks import CHOICES, FUNCTIONS, ChunkWriter, print_bodies, write_chunks, write_places
+from atwood.codegen.chunks import ChunkWriter, print_bodies, write_chunks, write_places
 from atwood.codegen.llvm.layout import Body, main_body, prologue_body
 from atwood.codegen.llvm.text import OWN_FUNCTIONS
-from atwood.errors import UnsupportedError
 from atwood.expr.core.graph import Expression
 from atwood.expr.core.program import Program
-
-_SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "less": "<", "less_equal": "<="}
-_FUNCTIONS = FUNCTIONS | {"sqrt": "sqrt", "floor": "floor", "absolute": "fabs"}
 
 
 def functions_of(programs: Iterable[Program]) -> list[str]:
@@ -71,9 +67,13 @@ def _joined(name: str, parts: Sequence[str], pointers: Sequence[str]) -> str:
 
 
 class _Writer(ChunkWriter):
-    """What has been written of one chunk of operations; every value has a name."""
+    """What has been written of one chunk of operations."""
 
-    declares = "const double"
+    language, declares, differs, bits = "C", "const double", "!=", ("1.0", "0.0")
+    functions: Mapping[str, str] = {"sqrt": "sqrt", "floor": "floor", "absolute": "fabs"}
+
+    def literal(self, value: float) -> str:
+        return literal(value)
 
     def cell(self, place: int) -> str:
         return f"scratch[{place}].f"
@@ -83,34 +83,3 @@ class _Writer(ChunkWriter):
         text = self.value(argument)
         self.lines += [f"word {name}[2];", f"own_sin_cos({text}, {name}, {name} + 1);"]
         return {"sin": f"{name}[0].f", "cos": f"{name}[1].f"}
-
-    def node(self, node: Expression) -> None:
-        self.keep(node, self._expression(node, [self.value(one) for one in node.arguments]))
-
-    def value(self, node: Expression) -> str:
-        if node.operation == "constant":
-            return literal(float(node.payload))
-        if node.index not in self.texts:
-            self.keep(node, self.places.known[node.index])
-        return f"v{node.index}"
-
-    def _expression(self, node: Expression, parts: list[str]) -> str:
-        operation = node.operation
-        if operation in _SIGNS:
-            return f"{parts[0]} {_SIGNS[operation]} {parts[1]}"
-        if operation in _FUNCTIONS:
-            return f"{_FUNCTIONS[operation]}({', '.join(parts)})"
-        if operation in CHOICES:
-            return f"{parts[0]} {CHOICES[operation]} {parts[1]} ? {parts[0]} : {parts[1]}"
-        match operation:
-            case "neg":
-                return f"-{parts[0]}"
-            case "sign":
-                return f"{parts[0]} > 0.0 ? 1.0 : {parts[0]} < 0.0 ? -1.0 : {parts[0]} * 0.0"
-            case "select":
-                return f"{parts[0]} != 0.0 ? {parts[1]} : {parts[2]}"
-            case "logical_and" | "logical_or":
-                return f"{parts[0]} != 0.0 {'&&' if operation == 'logical_and' else '||'} {parts[1]} != 0.0"
-            case "logical_not":
-                return f"{parts[0]} == 0.0"
-        raise UnsupportedError(f"there is no C for the operation {operation} in {node!r}")
