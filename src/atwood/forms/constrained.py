@@ -71,7 +71,8 @@ def constrained_program(
     sizes = tuple(graph.symbol(f"size of {one.name}") for one in equations.speed_names)
     held = keep_constraints(equations, kept)
     start = len(graph)
-    found = [*_accelerations(held, rows, parameters, sizes, light), *_projection(held, sizes)]  # to keep it would cost what it does
+    # Not kept in the cache: to name an entry, write and read it takes longer than this.
+    found = [*_accelerations(held, rows, parameters, sizes, light), *_projection(held, sizes)]
     graph.forget(start)
     n, m = len(equations.coordinates), len(equations.speeds)
     groups, known = state_groups(equations), (*parameters, *sizes)

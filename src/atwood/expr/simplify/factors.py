@@ -32,23 +32,23 @@ def join_known_factors(values: Sequence[Expression], known: Collection[Expressio
     made: dict[Expression, Expression] = {}
     products: dict[Expression, _Product] = {}
     for node in nodes:
-        product = _product(node, changing, products) if node.index in changing else None
+        product = _product(node, changing, products) if node in changing else None
         if product is not None:
             products[node] = product
             pair = sorted((product[0], made[product[1]]), key=lambda one: one.index)
             made[node] = node.graph.node("mul", tuple(pair))
-        elif node.index in changing and node.arguments:
+        elif node in changing and node.arguments:
             made[node] = build(node.graph, node.operation, [made[one] for one in node.arguments], node.payload)
         else:
             made[node] = node
     return [made[one] for one in values]
 
 
-def _product(node: Expression, changing: Collection[int], products: Mapping[Expression, _Product]) -> _Product | None:
+def _product(node: Expression, changing: Collection[Expression], products: Mapping[Expression, _Product]) -> _Product | None:
     """Return a product as its known factor and the rest, and so a sum of two multiples of one value or its opposite."""
     if node.operation == "mul":
-        factor, rest = sorted(node.arguments, key=lambda one: one.index in changing)
-        if factor.index in changing:
+        factor, rest = sorted(node.arguments, key=lambda one: one in changing)
+        if factor in changing:
             return None
         inner, core = products.get(rest, (node.graph.one, rest))
         return multiply(factor, inner), core
