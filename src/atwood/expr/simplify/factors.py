@@ -7,7 +7,7 @@ multiples of one value are such a product, too. Others stay as they are: what ca
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence, Set
 
 from atwood.expr.core.algebra import add, build, multiply, subtract
 from atwood.expr.core.analysis import live, varying
@@ -44,7 +44,7 @@ def join_known_factors(values: Sequence[Expression], known: Collection[Expressio
     return [made[one] for one in values]
 
 
-def _product(node: Expression, changing: Collection[Expression], products: Mapping[Expression, _Product]) -> _Product | None:
+def _product(node: Expression, changing: Set[Expression], products: Mapping[Expression, _Product]) -> _Product | None:
     """Return a product as its known factor and the rest, and so a sum of two multiples of one value or its opposite."""
     if node.operation == "mul":
         factor, rest = sorted(node.arguments, key=lambda one: one in changing)
