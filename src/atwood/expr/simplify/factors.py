@@ -8,6 +8,7 @@ multiples of one value are such a product, too. Others stay as they are: what ca
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence, Set
+from operator import is_
 
 from atwood.expr.core.algebra import add, build, multiply, subtract
 from atwood.expr.core.analysis import live, varying
@@ -37,10 +38,10 @@ def join_known_factors(values: Sequence[Expression], known: Collection[Expressio
             products[node] = product
             pair = sorted((product[0], made[product[1]]), key=lambda one: one.index)
             made[node] = node.graph.node("mul", tuple(pair))
-        elif node in changing and node.arguments:
-            made[node] = build(node.graph, node.operation, [made[one] for one in node.arguments], node.payload)
-        else:
-            made[node] = node
+            continue
+        own = [made[one] for one in node.arguments]
+        is_same = all(map(is_, own, node.arguments))
+        made[node] = node if is_same else build(node.graph, node.operation, own, node.payload)
     return [made[one] for one in values]
 
 

@@ -405,7 +405,7 @@ def _run(pair: Tableau) -> Routine:
         with r.when(m.crossed != 0):
             r.repeat(steps)
         begin, end, y_old, y, trial = (m.row(one) for one in (0, "end slope", "y_old", "y", "trial"))
-        with m.parts() as j:
+        with m.parts() as j:  # few numbers: to call the library for them takes longer
             begin[j] = m.lanes(end, j)
         m.is_dense = 0
         with r.when(r.call("attempt", m.session) != 0):

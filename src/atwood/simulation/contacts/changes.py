@@ -268,7 +268,7 @@ class _Moment:
         if in_turn and not _is_alike(spans, RECENT):  # two gaps in turn, each after an interval of its own
             spans = [a + b for a, b in zip(spans[::2], spans[1::2], strict=False)]
         if self._in_turn and not _is_alike(spans, RECENT // 2):
-            return self._end_of_swings(closing, impacts, newest * speed, lasts)
+            return self._end_of_swings(closing, impacts, (newest, speed), lasts)
         if len(spans) < SPANS[0] or spans[0] <= 0.0:
             return None
         # Impacts that only happen to be near each other are no series: each interval shrinks about as the one before.
@@ -285,7 +285,6 @@ class _Moment:
         is_elastic, pull = self._bouncing(
             closing[0], moved, {part for time, part in impacts if time >= self.t - lasted}
         )
-        speed = abs(float(self.values.rates[self.units[closing[0]][0]]))
         if speed > pull * lasted:  # it is squeezed
             is_over = math.isfinite(left) and spans[0] * speed < SQUEEZED * self.small[closing[0]]
         else:
@@ -305,7 +304,11 @@ class _Moment:
         return found if 0.0 <= found <= most else left
 
     def _end_of_swings(
-        self, closing: list[int], impacts: Sequence[tuple[float, str]], height: float, lasts: tuple[float, float]
+        self,
+        closing: list[int],
+        impacts: Sequence[tuple[float, str]],
+        newest: tuple[float, float],
+        lasts: tuple[float, float],
     ) -> float | None:
         """Return in how long impacts of gaps in turn come to an end whose intervals swing; None as long as gaps open.
 
@@ -313,14 +316,13 @@ class _Moment:
         ----------
         closing, impacts
             The gaps that close now, and times and parts of the impacts before.
-        height
-            How far the gap has opened since the last impact, about.
+        newest
+            How long the gap has been open since the last impact, about, and how fast it closes.
         lasts
             How long the last impacts took, and as many before.
         """
-        late, early = lasts
-        highest = late / RECENT * abs(float(self.values.rates[self.units[closing[0]][0]]))
-        if min(height, highest / SQUEEZED) > self.small[closing[0]]:
+        (late, early), (span, speed) = lasts, newest
+        if min(span * speed, late / RECENT * speed / SQUEEZED) > self.small[closing[0]]:
             return None
         self._end_series(closing, impacts, late + early)
         return late * late / (early - late)

@@ -45,10 +45,8 @@ def with_doubts(events: Sequence[EventRecord], least: float) -> tuple[EventRecor
             continue
         times = [x.time for x in events[:number] if x.kind == "impact" and (x.part, x.law) == (one.part, one.law)]
         doubt = 0.0 if len(times) <= _FEW else one.time - times[-1]
-        in_turn = any(
-            x.kind == "impact" and x.part != one.part and times[-2] < x.time < times[-1]
-            for x in events[:number]
-            if doubt
+        in_turn = doubt != 0.0 and any(
+            x.kind == "impact" and x.part != one.part and times[-2] < x.time < times[-1] for x in events[:number]
         )
         for count in range(len(times), _FEW, -1):
             may_be_off, is_rounding = _doubt(times[max(0, count - _LOOKED_AT) : count], one.time, in_turn)

@@ -401,10 +401,8 @@ class EventProbe:
     def values(self, t: float, q: FloatArray, u: FloatArray) -> FloatArray:
         """Return the value of each event at a state, shifted where it starts at zero."""
         assert self.kernel is not None
-        values: FloatArray
         if self.needs == _NOTHING:
-            values = np.asarray(self.kernel([t], q, u, np.zeros_like(self.shift))[0]) + self.shift
-            return values
+            return np.asarray(self.kernel([t], q, u, self.shift)[0])
         reactions: Any = [0.0] * len(self.assembly.reactions)
         accelerations = np.zeros_like(u)
         if self.reactions is not None:
@@ -412,7 +410,7 @@ class EventProbe:
             reactions = found[:, 0]
         if self.needs.accelerations and len(u):
             accelerations, _ = self.plan.balance.accelerate(t, q, u, self.plan.kept)
-        values = np.asarray(self.kernel([t], q, u, accelerations, reactions)[0]) + self.shift
+        values: FloatArray = np.asarray(self.kernel([t], q, u, accelerations, reactions)[0]) + self.shift
         return values
 
     def compiled(self, for_ida: bool) -> EventData | None:
